@@ -1,0 +1,32 @@
+# Sourced by ./run and ./test: installs what is missing (Debian, root or sudo) and builds one preset. Quick when nothing is to do.
+
+packages_host=(g++ cmake ninja-build libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev
+               libgtest-dev gnuplot-nox)
+packages_qemu_m4f=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
+
+say() { printf '\033[1m%s\033[0m\n' "$*" >&2; }
+
+install_missing() {
+  local missing=() package
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  local as_root=""
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || { echo "Missing packages: ${missing[*]}. Run this as root or install sudo." >&2; exit 2; }
+    as_root=sudo
+  fi
+  say "Installing: ${missing[*]}"
+  $as_root apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# set_up PRESET: packages, configuration, build. The root folder is $here.
+set_up() {
+  local preset=$1
+  install_missing "${packages_host[@]}"
+  [ "$preset" = qemu-m4f ] && install_missing "${packages_qemu_m4f[@]}"
+  say "Building: $preset"
+  (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" >&2)
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Writing files whole or not at all.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "wire/pc/user_error.hpp"
+
+namespace wire::pc {
+
+/// Writes `text` beside `path` and renames it into place: whoever reads `path` sees the old file or the new one.
+/// Makes the folder if it is missing. Throws UserError (usage) when the place cannot be written.
+inline void write_whole(const std::string& path, const std::string& text) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty()) fs::create_directories(folder, error);
+  const std::string unfinished = path + ".part";
+  {
+    std::ofstream out(unfinished, std::ios::binary);
+    out << text;
+    out.flush();
+    if (!out) {
+      std::remove(unfinished.c_str());
+      throw UserError(Exit::usage, path + ": cannot be written; choose another folder or make room.");
+    }
+  }
+  fs::rename(unfinished, path, error);
+  if (error) {
+    std::remove(unfinished.c_str());
+    throw UserError(Exit::usage, path + ": cannot be written (" + error.message() + "); choose another place.");
+  }
+}
+
+}  // namespace wire::pc

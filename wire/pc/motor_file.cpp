@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+#include "wire/pc/motor_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <toml++/toml.h>
+
+#include "wire/pc/names.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace wire::pc {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::usage, sentence); }
+
+enum class Need { must, may };
+enum class Range { positive, zero_or_more };
+
+/// One key of a motor file, in the units of motor sheets.
+struct Key {
+  const char* name;
+  Need need;
+  Range range;
+  double otherwise;  // value of a key that may be missing
+};
+
+// Defaults: the copper coefficient of IEC 60228 copper at 25 degC; no phase coupling, which is the safe side.
+constexpr Key keys[] = {
+    {"terminal_resistance_ohm", Need::must, Range::positive, 0},
+    {"terminal_inductance_mH", Need::must, Range::positive, 0},
+    {"saliency", Need::may, Range::positive, 1},  // Lq / Ld
+    {"torque_constant_mNm_per_A", Need::must, Range::positive, 0},
+    {"pole_pairs", Need::must, Range::positive, 0},
+    {"rotor_inertia_gcm2", Need::must, Range::positive, 0},
+    {"rated_current_A", Need::must, Range::positive, 0},
+    {"R1_K_per_W", Need::must, Range::positive, 0},
+    {"R2_K_per_W", Need::must, Range::positive, 0},
+    {"tau_winding_s", Need::must, Range::positive, 0},
+    {"tau_motor_s", Need::must, Range::positive, 0},
+    {"winding_max_degC", Need::must, Range::positive, 0},
+    {"copper_coefficient_per_K", Need::may, Range::zero_or_more, 0.00393},
+    {"phase_coupling_W_per_K", Need::may, Range::zero_or_more, 0},
+};
+constexpr const char* text_keys[] = {"name", "source", "status"};
+
+double number(const toml::table& table, const std::string& path, const char* name) {
+  const Key& key = *std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return std::string(k.name) == name; });
+  const toml::node* node = table.get(name);
+  if (node == nullptr) {
+    if (key.need == Need::may) return key.otherwise;
+    refuse(fmt::format("{}: the key '{}' is missing; add it (boards/motors/ has complete examples).", path, name));
+  }
+  const auto value = node->value<double>();
+  if (!value) refuse(fmt::format("{}: '{}' must be a number.", path, name));
+  const bool in_range = key.range == Range::positive ? *value > 0 : *value >= 0;
+  if (!in_range || !std::isfinite(*value)) {
+    refuse(fmt::format("{}: {} = {} cannot be; it must be a finite number {} zero.", path, name, *value,
+                       key.range == Range::positive ? "above" : "not below"));
+  }
+  return *value;
+}
+
+std::string find_file(const std::string& which, const std::string& folder) {
+  if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
+    if (fs::is_regular_file(which)) return which;
+    refuse(fmt::format("{}: there is no such motor file.", which));
+  }
+  const std::string path = folder + "/" + which + ".toml";
+  if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
+  const std::vector<std::string> known = motor_names(folder);
+  const std::string hint = did_you_mean(which, known);
+  refuse(fmt::format("Unknown motor '{}'{} Known motors: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
+}
+
+}  // namespace
+
+std::vector<std::string> motor_names(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+MotorFile read_motor(const std::string& which, const std::string& folder) {
+  const std::string path = find_file(which, folder);
+  toml::table table;
+  try {
+    table = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    refuse(fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line, error.description()));
+  }
+
+  std::vector<std::string> known;
+  for (const Key& key : keys) known.push_back(key.name);
+  known.insert(known.end(), std::begin(text_keys), std::end(text_keys));
+  for (const auto& [key, node] : table) {
+    const std::string name{key.str()};
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      const std::string hint = did_you_mean(name, known);
+      refuse(fmt::format("{}: unknown key '{}'{}", path, name,
+                         hint.empty() ? "; boards/motors/ has examples with every key." : hint));
+    }
+  }
+
+  const auto get = [&](const char* name) { return number(table, path, name); };
+  const double pole_pairs = get("pole_pairs");
+  if (pole_pairs != std::floor(pole_pairs) || pole_pairs > 100) {
+    refuse(fmt::format("{}: pole_pairs = {} must be a whole number from 1 to 100.", path, pole_pairs));
+  }
+
+  MotorFile file;
+  file.id = fs::path(path).stem().string();
+  file.name = table["name"].value_or(file.id);
+  file.source = table["source"].value_or(std::string("not stated"));
+  file.surrogate = table["status"].value_or(std::string()) == "surrogate";
+
+  const double R1 = get("R1_K_per_W"), R2 = get("R2_K_per_W");
+  const double inductance_d_H = get("terminal_inductance_mH") * 1e-3 / 2;
+  file.motor = Motor{
+      .phase_resistance_ohm = get("terminal_resistance_ohm") / 2,
+      .inductance_d_H = inductance_d_H,
+      .inductance_q_H = inductance_d_H * get("saliency"),
+      .flux_linkage_Wb = get("torque_constant_mNm_per_A") * 1e-3 / (std::sqrt(3.0) * pole_pairs),
+      .pole_pairs = static_cast<int>(pole_pairs),
+      .rotor_inertia_kg_m2 = get("rotor_inertia_gcm2") * 1e-7,
+      .R1_K_per_W = R1,
+      .R2_K_per_W = R2,
+      .C1_J_per_K = get("tau_winding_s") / R1,  // sheet definition: tau_w = R1 C1, tau_m = R2 C2
+      .C2_J_per_K = get("tau_motor_s") / R2,
+      .copper_coefficient_per_K = get("copper_coefficient_per_K"),
+      .winding_max_degC = get("winding_max_degC"),
+      .phase_coupling_W_per_K = get("phase_coupling_W_per_K"),
+      .rated_current_A = get("rated_current_A"),
+  };
+  return file;
+}
+
+}  // namespace wire::pc

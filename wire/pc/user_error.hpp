@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// How a PC program says no: one plain sentence (what, where, what to do next) and a documented exit code.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace wire::pc {
+
+enum class Exit : int {
+  answered = 0,   // an answer was given
+  usage = 2,      // the command line, a parameter file or a motor file is wrong
+  unusable = 3,   // the data cannot be used
+};
+
+class UserError : public std::runtime_error {
+ public:
+  UserError(Exit exit, const std::string& sentence) : std::runtime_error(sentence), exit_(exit) {}
+  int exit_code() const { return static_cast<int>(exit_); }
+
+ private:
+  Exit exit_;
+};
+
+}  // namespace wire::pc
