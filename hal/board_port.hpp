@@ -4,7 +4,8 @@
 
 namespace hal {
 
-/// A temperature that may be missing. `valid` false: open, short, out of range or stale; then `value_degC` means nothing.
+/// A temperature that may be missing. `valid` false: open, short, out of range or stale; then `value_degC` means
+/// nothing.
 struct Temperature {
   float value_degC;
   bool valid;
@@ -18,7 +19,7 @@ struct AxisSlowSample {
 /// Slow measurements shared by both axes.
 struct BoardSlowSample {
   Temperature power_stage;
-  float bus_A;          // bus current, positive out of the supply
+  float bus_A;  // bus current, positive out of the supply
   bool bus_A_valid;
 };
 

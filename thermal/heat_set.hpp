@@ -2,8 +2,8 @@
 // A heat network as plain data: nodes that store heat, links that carry it, sources that make it.
 //
 // The two-resistor motor is one such set, the three-phase motor another, and what identification finds is written back
-// as a third: the firmware runs them all without new code. Fixed capacity, no heap, no pointers; a set is validated as a
-// whole (validate) before any of it is used.
+// as a third: the firmware runs them all without new code. Fixed capacity, no heap, no pointers; a set is validated as
+// a whole (validate) before any of it is used.
 //
 //   C_n dT_n/dt = sum_links G(law) (T_other - T_n) + sum_sources gain * drive * (1 + alpha (T_n - 25))
 //
@@ -24,19 +24,19 @@ inline constexpr int boundary_count = static_cast<int>(Boundary::count);
 
 /// What drives a source: means over one step, each nonlinear form taken before the mean.
 enum class Drive : std::uint8_t {
-  one,                    // constant heat
-  phase_a_A2,             // square of the current in one phase
+  one,         // constant heat
+  phase_a_A2,  // square of the current in one phase
   phase_b_A2,
   phase_c_A2,
-  current_A2,             // squared amplitude of the current vector, id^2 + iq^2
-  current_A,              // amplitude
-  speed_rad_per_s,        // |mechanical speed|
+  current_A2,       // squared amplitude of the current vector, id^2 + iq^2
+  current_A,        // amplitude
+  speed_rad_per_s,  // |mechanical speed|
   speed2_rad2_per_s2,
   speed3_rad3_per_s3,
-  current2_speed2,        // |i|^2 w^2
-  current_speed,          // |i| |w|
-  enabled,                // share of the time the bridge switched
-  power_W,                // heat measured elsewhere
+  current2_speed2,  // |i|^2 w^2
+  current_speed,    // |i| |w|
+  enabled,          // share of the time the bridge switched
+  power_W,          // heat measured elsewhere
   count
 };
 inline constexpr int drive_count = static_cast<int>(Drive::count);
@@ -51,7 +51,9 @@ enum class LinkLaw : std::uint8_t {
 
 /// End of a link: a node (0..node_count-1) or a boundary (boundary_end(...)).
 inline constexpr int first_boundary = 64;
-constexpr std::int8_t boundary_end(Boundary b) { return static_cast<std::int8_t>(first_boundary + static_cast<int>(b)); }
+constexpr std::int8_t boundary_end(Boundary b) {
+  return static_cast<std::int8_t>(first_boundary + static_cast<int>(b));
+}
 
 template <class Scalar>
 struct Node {

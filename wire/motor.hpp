@@ -26,10 +26,10 @@ struct Motor {
   double R2_K_per_W;
   double C1_J_per_K;
   double C2_J_per_K;
-  double copper_coefficient_per_K;   // of resistance, referred to 25 degC
+  double copper_coefficient_per_K;  // of resistance, referred to 25 degC
   double winding_max_degC;
-  double phase_coupling_W_per_K;     // between each pair of phase windings; 0 is the safe side
-  double rated_current_A;            // catalogue, direct current through two terminals
+  double phase_coupling_W_per_K;  // between each pair of phase windings; 0 is the safe side
+  double rated_current_A;         // catalogue, direct current through two terminals
 };
 
 }  // namespace wire

@@ -65,7 +65,8 @@ TEST(MotorFile, AMisspeltKeyIsAnsweredWithTheNearest) {
 }
 
 TEST(MotorFile, NumbersThatCannotBeAreRefused) {
-  EXPECT_NE(complaint(file_with("tau_winding_s", "tau_winding_s = -1.22")).find("tau_winding_s = -1.22 cannot be"), std::string::npos);
+  EXPECT_NE(complaint(file_with("tau_winding_s", "tau_winding_s = -1.22")).find("tau_winding_s = -1.22 cannot be"),
+            std::string::npos);
   EXPECT_NE(complaint(file_with("R1_K", "R1_K_per_W = nan")).find("finite number above zero"), std::string::npos);
   EXPECT_NE(complaint(file_with("pole_pairs", "pole_pairs = 1.5")).find("whole number"), std::string::npos);
   EXPECT_NE(complaint(file_with("R2_K", "R2_K_per_W = \"warm\"")).find("must be a number"), std::string::npos);

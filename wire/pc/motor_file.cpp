@@ -2,12 +2,12 @@
 #include "wire/pc/motor_file.hpp"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <toml++/toml.h>
 
 #include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
@@ -50,7 +50,8 @@ constexpr Key keys[] = {
 constexpr const char* text_keys[] = {"name", "source", "status"};
 
 double number(const toml::table& table, const std::string& path, const char* name) {
-  const Key& key = *std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return std::string(k.name) == name; });
+  const Key& key =
+      *std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return std::string(k.name) == name; });
   const toml::node* node = table.get(name);
   if (node == nullptr) {
     if (key.need == Need::may) return key.otherwise;
@@ -75,7 +76,8 @@ std::string find_file(const std::string& which, const std::string& folder) {
   if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
   const std::vector<std::string> known = motor_names(folder);
   const std::string hint = did_you_mean(which, known);
-  refuse(fmt::format("Unknown motor '{}'{} Known motors: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
+  refuse(
+      fmt::format("Unknown motor '{}'{} Known motors: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
 }
 
 }  // namespace

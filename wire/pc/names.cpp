@@ -28,7 +28,9 @@ std::string nearest(std::string_view given, const std::vector<std::string>& know
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(given.size() / 2, 2);
   for (const std::string& name : known) {
-    const std::size_t distance = edit_distance(given.substr(0, 200), name);
+    // A name without its unit ("angle" for "angle_rad") is the commonest slip.
+    const bool unit_left_out = !given.empty() && name.rfind(std::string(given) + "_", 0) == 0;
+    const std::size_t distance = unit_left_out ? 0 : edit_distance(given.substr(0, 200), name);
     if (distance < best_distance) {
       best_distance = distance;
       best = name;

@@ -35,8 +35,10 @@ std::string quoted(const std::string& text) {
 std::string data_block(const std::string& name, const Curve& curve) {
   std::string out = fmt::format("${} << EOD\n", name);
   const auto line = [&](std::size_t i) {
-    if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i])) out += fmt::format("{:.9g} {:.6g}\n", curve.x[i], curve.y[i]);
-    else out += "\n";
+    if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]))
+      out += fmt::format("{:.9g} {:.6g}\n", curve.x[i], curve.y[i]);
+    else
+      out += "\n";
   };
   const std::size_t n = std::min(curve.x.size(), curve.y.size());
   if (n <= most_points) {
@@ -63,13 +65,13 @@ std::string data_block(const std::string& name, const Curve& curve) {
 std::string script(const Picture& picture, const std::string& output) {
   const int panels = static_cast<int>(picture.panels.size());
   const int height = head_height + panels * panel_height + foot_height;
-  std::string s = fmt::format("set terminal svg size {},{} dynamic background '#ffffff' font 'Helvetica,Arial,sans-serif,13'\n",
-                              width, height);
+  std::string s = fmt::format(
+      "set terminal svg size {},{} dynamic background '#ffffff' font 'Helvetica,Arial,sans-serif,13'\n", width, height);
   s += fmt::format("set output {}\nset encoding utf8\n", quoted(output));
   s += fmt::format("set label 1 {} at screen 0.012,{} left font ',18' noenhanced\n", quoted(picture.title),
                    1.0 - 24.0 / height);
-  s += fmt::format("set label 2 {} at screen 0.012,{} left font ',12' textcolor '#606060' noenhanced\n", quoted(picture.note),
-                   1.0 - 46.0 / height);
+  s += fmt::format("set label 2 {} at screen 0.012,{} left font ',12' textcolor '#606060' noenhanced\n",
+                   quoted(picture.note), 1.0 - 46.0 / height);
   s += "set border 3 lc '#808080'\nset tics nomirror textcolor '#404040'\nset grid lc '#e4e4e4' lt 1\n"
        "set key outside right top vertical noenhanced samplen 1.6 width 0 maxrows 12\nset lmargin at screen 0.085\nset "
        "rmargin at screen 0.78\n";
@@ -95,9 +97,11 @@ std::string script(const Picture& picture, const std::string& output) {
     const double bottom = top - static_cast<double>(panel_height - 30) / height;
     s += fmt::format("set tmargin at screen {}\nset bmargin at screen {}\n", top, bottom);
     s += fmt::format("set ylabel {} noenhanced textcolor '#404040'\n", quoted(panel.y_label));
-    s += p + 1 == panels ? fmt::format("set xlabel {} noenhanced textcolor '#404040'\nset format x '%g'\n", quoted(picture.x_label))
-                         : std::string("unset xlabel\nset format x ''\n");
-    s += panel.title.empty() ? "unset title\n" : fmt::format("set title {} noenhanced font ',13' offset 0,-0.7\n", quoted(panel.title));
+    s += p + 1 == panels
+             ? fmt::format("set xlabel {} noenhanced textcolor '#404040'\nset format x '%g'\n", quoted(picture.x_label))
+             : std::string("unset xlabel\nset format x ''\n");
+    s += panel.title.empty() ? "unset title\n"
+                             : fmt::format("set title {} noenhanced font ',13' offset 0,-0.7\n", quoted(panel.title));
     s += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
     s += panel.y_min != panel.y_max ? fmt::format("set yrange [{}:{}]\n", panel.y_min, panel.y_max)
                                     : std::string("set yrange [*:*]\nset offsets graph 0,0,0.06,0.06\n");
@@ -105,25 +109,30 @@ std::string script(const Picture& picture, const std::string& output) {
     for (int label = 10; label < 40; ++label) s += fmt::format("unset label {}\n", label);
     int tag = 10;
     for (const Stretch& stretch : panel.stretches) {
-      s += fmt::format("set object rectangle from first {},graph 0 to first {},graph 1 fc rgb '{}' fs solid noborder behind\n",
-                       stretch.from, stretch.to, stretch.colour);
+      s += fmt::format(
+          "set object rectangle from first {},graph 0 to first {},graph 1 fc rgb '{}' fs solid noborder behind\n",
+          stretch.from, stretch.to, stretch.colour);
       if (!stretch.label.empty() && tag < 40) {
-        s += fmt::format("set label {} {} at first {},graph 0.93 left font ',11' textcolor '#905040' noenhanced\n", tag++,
-                         quoted(stretch.label), stretch.from);
+        s += fmt::format("set label {} {} at first {},graph 0.93 left font ',11' textcolor '#905040' noenhanced\n",
+                         tag++, quoted(stretch.label), stretch.from);
       }
     }
     for (const Level& level : panel.levels) {
-      s += fmt::format("set arrow from graph 0,first {0} to graph 1,first {0} nohead lc '#b00000' dt 2 lw 1.2\n", level.y);
+      s += fmt::format("set arrow from graph 0,first {0} to graph 1,first {0} nohead lc '#b00000' dt 2 lw 1.2\n",
+                       level.y);
       if (tag < 40) {
-        s += fmt::format("set label {} {} at graph 0.01,first {} left offset 0,0.5 font ',11' textcolor '#b00000' noenhanced\n", tag++,
-                         quoted(level.label), level.y);
+        s += fmt::format(
+            "set label {} {} at graph 0.01,first {} left offset 0,0.5 font ',11' textcolor '#b00000' noenhanced\n",
+            tag++, quoted(level.label), level.y);
       }
     }
     std::string plots;
     for (std::size_t c = 0; c < panel.curves.size(); ++c) {
       const Curve& curve = panel.curves[c];
       const std::string colour = curve.colour.empty() ? palette[c % std::size(palette)] : curve.colour;
-      const std::string style = curve.dots ? "points pt 7 ps 0.35" : curve.dashed ? "lines lw 1.8 dt 2" : "lines lw 1.8";
+      const std::string style = curve.dots     ? "points pt 7 ps 0.35"
+                                : curve.dashed ? "lines lw 1.8 dt 2"
+                                               : "lines lw 1.8";
       plots += fmt::format("{}$p{}c{} using 1:2 with {} lc rgb '{}' {}", plots.empty() ? "" : ", ", p, c, style, colour,
                            curve.label.empty() ? "notitle" : "title " + quoted(curve.label));
     }
@@ -139,7 +148,8 @@ std::string script(const Picture& picture, const std::string& output) {
 std::string svg(const Picture& picture) {
   namespace fs = std::filesystem;
   std::string folder = (fs::temp_directory_path() / "hotcore-plot-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) throw UserError(Exit::usage, "No temporary folder can be made; set TMPDIR to a folder with room.");
+  if (mkdtemp(folder.data()) == nullptr)
+    throw UserError(Exit::usage, "No temporary folder can be made; set TMPDIR to a folder with room.");
   const std::string source = folder + "/plot.gp", output = folder + "/plot.svg";
   std::ofstream(source) << script(picture, output);
   const int status = std::system(fmt::format("gnuplot '{}' > '{}/messages' 2>&1", source, folder).c_str());
@@ -150,7 +160,8 @@ std::string svg(const Picture& picture) {
   std::error_code none;
   fs::remove_all(folder, none);
   if (status != 0 || text.str().empty()) {
-    throw UserError(Exit::usage, "The picture could not be drawn" + (complaint.empty() ? std::string() : " (" + complaint + ")") +
+    throw UserError(Exit::usage, "The picture could not be drawn" +
+                                     (complaint.empty() ? std::string() : " (" + complaint + ")") +
                                      "; ./run installs gnuplot, which draws it.");
   }
   return text.str();

@@ -13,7 +13,7 @@ struct Curve {
   std::vector<double> x, y;  // same length; NaN breaks the line
   std::string colour = "";   // "#rrggbb"; empty: the next one of the palette
   bool dashed = false;
-  bool dots = false;         // points instead of a line
+  bool dots = false;  // points instead of a line
 };
 
 /// A stretch of x with a tinted background: where the model is wrong, where a limit held.
@@ -30,12 +30,12 @@ struct Level {
 };
 
 struct Panel {
-  std::string y_label;                    // with unit
+  std::string y_label;  // with unit
   std::vector<Curve> curves;
   std::vector<Level> levels = {};
   std::vector<Stretch> stretches = {};
   bool log_y = false;
-  double y_min = 0, y_max = 0;            // equal: chosen from the data
+  double y_min = 0, y_max = 0;  // equal: chosen from the data
   std::string title = "";
 };
 
@@ -45,7 +45,7 @@ struct Picture {
   std::string x_label;
   std::vector<Panel> panels;
   bool log_x = false;
-  std::string note = "";                  // small print under the title: what a person should see, what is simulated
+  std::string note = "";  // small print under the title: what a person should see, what is simulated
   std::pair<double, double> x_range = {0, 0};  // equal: chosen from the data
 };
 

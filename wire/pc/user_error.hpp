@@ -8,9 +8,9 @@
 namespace wire::pc {
 
 enum class Exit : int {
-  answered = 0,   // an answer was given
-  usage = 2,      // the command line, a parameter file or a motor file is wrong
-  unusable = 3,   // the data cannot be used
+  answered = 0,  // an answer was given
+  usage = 2,     // the command line, a parameter file or a motor file is wrong
+  unusable = 3,  // the data cannot be used
 };
 
 class UserError : public std::runtime_error {

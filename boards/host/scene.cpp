@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#include "boards/host/scene.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <numbers>
+
+#include "wire/pc/names.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace boards::host {
+namespace {
+
+namespace fs = std::filesystem;
+using wire::pc::did_you_mean;
+
+[[noreturn]] void refuse(const std::string& sentence) { throw wire::pc::UserError(wire::pc::Exit::usage, sentence); }
+
+constexpr std::pair<const char*, Limiter> limiter_names[] = {{"governor", Limiter::governor},
+                                                             {"rated", Limiter::rated},
+                                                             {"housing", Limiter::housing},
+                                                             {"hard_cut", Limiter::hard_cut}};
+
+/// Where a key of a table goes: a text, or a number with the range it must lie in.
+struct Number {
+  double* value;
+  double low, high;
+};
+struct Slots {
+  std::map<std::string, std::string*> texts;
+  std::map<std::string, Number> numbers;
+  std::vector<std::string> others;  // tables and lists, read elsewhere
+};
+
+void put_number(const std::string& place, const std::string& key, const Number& slot, double value) {
+  if (!(value >= slot.low && value <= slot.high)) {
+    refuse(fmt::format("{}: {} = {} is out of range; give {} to {}.", place, key, value, slot.low, slot.high));
+  }
+  *slot.value = value;
+}
+
+void read_table(const std::string& place, const toml::table& table, const Slots& slots) {
+  for (const auto& [toml_key, node] : table) {
+    const std::string key{toml_key.str()};
+    if (const auto text = slots.texts.find(key); text != slots.texts.end()) {
+      const auto value = node.value<std::string>();
+      if (!value) refuse(fmt::format("{}: '{}' must be a text in quotes.", place, key));
+      *text->second = *value;
+    } else if (const auto number = slots.numbers.find(key); number != slots.numbers.end()) {
+      const auto value = node.value<double>();
+      if (!value) refuse(fmt::format("{}: '{}' must be a number.", place, key));
+      put_number(place, key, number->second, *value);
+    } else if (std::find(slots.others.begin(), slots.others.end(), key) == slots.others.end()) {
+      std::vector<std::string> known = slots.others;
+      for (const auto& [name, slot] : slots.texts) known.push_back(name);
+      for (const auto& [name, slot] : slots.numbers) known.push_back(name);
+      const std::string hint = did_you_mean(key, known);
+      refuse(fmt::format("{}: unknown key '{}'{}", place, key,
+                         hint.empty() ? fmt::format("; known keys: {}.", fmt::join(known, ", ")) : hint));
+    }
+  }
+}
+
+// Bounds are what the numerics were tried with, not what is wise: a day, the boiling point of solder, a large robot.
+constexpr double day_s = 86400, hottest_degC = 300, most_A = 200;
+
+struct Reader {
+  Scene scene;
+  double seed = 1;
+
+  Slots top() {
+    Scene& s = scene;
+    return {{{"title", &s.title}, {"note", &s.note}, {"motor", &s.motor}, {"board", &s.board}},
+            {{"seconds", {&s.seconds, 1e-3, day_s}},
+             {"log_Hz", {&s.log_Hz, 0.1, 20000}},
+             {"seed", {&seed, 0, 4294967295.0}},
+             {"ambient_degC", {&s.ambient_degC, -40, 100}},
+             {"start_degC", {&s.start_degC, -40, hottest_degC}},
+             {"housing_limit_degC", {&s.housing_limit_degC, 0, hottest_degC}},
+             {"coolant_K_per_W", {&s.coolant_K_per_W, 0, 100}},
+             {"supply_V", {&s.supply_V, 5, 100}}},
+            {"limiters", "demand", "shaft"}};
+  }
+
+  Slots shaft(std::string* kind) {
+    Shaft& s = scene.shaft;
+    return {{{"kind", kind}},
+            {{"angle_rad", {&s.angle_rad, -10, 10}},
+             {"load_inertia_kg_m2", {&s.load_inertia_kg_m2, 0, 1}},
+             {"friction_Nm", {&s.friction_Nm, 0, 100}},
+             {"speed_rad_per_s", {&s.speed_rad_per_s, -5000, 5000}},
+             {"speed_amplitude_rad_per_s", {&s.speed_amplitude_rad_per_s, 0, 5000}},
+             {"frequency_Hz", {&s.frequency_Hz, 0, 100}}},
+            {}};
+  }
+
+  void read_shaft(const std::string& place, const toml::table& table) {
+    std::string kind = "locked";
+    read_table(place, table, shaft(&kind));
+    if (kind == "locked")
+      scene.shaft.kind = Shaft::Kind::locked;
+    else if (kind == "free")
+      scene.shaft.kind = Shaft::Kind::free;
+    else if (kind == "imposed")
+      scene.shaft.kind = Shaft::Kind::imposed;
+    else
+      refuse(fmt::format("{}: kind = '{}' is not one of locked, free, imposed.", place, kind));
+  }
+
+  void read_demands(const std::string& path, const toml::array& list) {
+    for (const toml::node& node : list) {
+      const std::string place = fmt::format("{}: demand {}", path, scene.demands.size() + 1);
+      if (!node.is_table()) refuse(place + " must be a [[demand]] table.");
+      Demand d;
+      double axis = 0;
+      read_table(place, *node.as_table(),
+                 {{},
+                  {{"axis", {&axis, 0, 1}},
+                   {"from_s", {&d.from_s, 0, day_s}},
+                   {"to_s", {&d.to_s, 0, day_s}},
+                   {"current_A", {&d.current_A, -most_A, most_A}},
+                   {"ripple_ratio", {&d.ripple_ratio, 0, 10}},
+                   {"frequency_Hz", {&d.frequency_Hz, 0, 1000}}},
+                  {}});
+      d.axis = axis >= 0.5 ? 1 : 0;
+      if (!(d.to_s > d.from_s)) refuse(place + ": to_s must lie after from_s.");
+      scene.demands.push_back(d);
+    }
+  }
+
+  void read_limiters(const std::string& path, const toml::array& list) {
+    scene.limiters.clear();
+    for (const toml::node& node : list) {
+      const std::string wanted = node.value<std::string>().value_or("");
+      const auto found = std::find_if(std::begin(limiter_names), std::end(limiter_names),
+                                      [&](const auto& entry) { return wanted == entry.first; });
+      if (found == std::end(limiter_names)) {
+        refuse(fmt::format("{}: limiter '{}' is not one of governor, rated, housing, hard_cut.", path, wanted));
+      }
+      scene.limiters.push_back(found->second);
+    }
+    if (scene.limiters.empty()) refuse(path + ": limiters is empty; name at least governor.");
+  }
+
+  void apply(const std::string& override_text) {
+    const auto equals = override_text.find('=');
+    if (equals == std::string::npos) refuse(fmt::format("--set {}: write it as key=value.", override_text));
+    std::string key = override_text.substr(0, equals);
+    const std::string value = override_text.substr(equals + 1);
+    std::string kind;
+    Slots slots = top();
+    if (key.rfind("shaft.", 0) == 0) {
+      key = key.substr(6);
+      slots = shaft(&kind);
+      slots.texts.clear();
+    }
+    if (slots.texts.count(key) != 0) {
+      *slots.texts[key] = value;
+      return;
+    }
+    const auto number = slots.numbers.find(key);
+    if (number == slots.numbers.end()) {
+      std::vector<std::string> known;
+      for (const auto& [name, slot] : slots.texts) known.push_back(name);
+      for (const auto& [name, slot] : slots.numbers) known.push_back(name);
+      const std::string hint = did_you_mean(key, known);
+      refuse(fmt::format("--set {}: unknown key{}", override_text,
+                         hint.empty() ? fmt::format("; known: {}, shaft.*.", fmt::join(known, ", ")) : hint));
+    }
+    char* end = nullptr;
+    const double parsed = std::strtod(value.c_str(), &end);
+    if (value.empty() || *end != '\0') refuse(fmt::format("--set {}: '{}' is not a number.", override_text, value));
+    put_number("--set", key, number->second, parsed);
+  }
+};
+
+std::string find_file(const std::string& which, const std::string& folder) {
+  if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
+    if (fs::is_regular_file(which)) return which;
+    refuse(fmt::format("{}: there is no such scene file.", which));
+  }
+  const std::string path = folder + "/" + which + ".toml";
+  if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
+  const std::vector<std::string> known = scene_names(folder);
+  const std::string hint = did_you_mean(which, known);
+  refuse(fmt::format("Unknown scene '{}'{} Scenes: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
+}
+
+}  // namespace
+
+const char* name_of(Limiter limiter) {
+  for (const auto& [name, value] : limiter_names) {
+    if (value == limiter) return name;
+  }
+  return "";
+}
+
+std::vector<std::string> scene_names(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Scene read_scene(const std::string& which, const std::string& folder, const std::vector<std::string>& overrides) {
+  const std::string path = find_file(which, folder);
+  toml::table table;
+  try {
+    table = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    refuse(fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line, error.description()));
+  }
+  Reader reader;
+  reader.scene.id = fs::path(path).stem().string();
+  reader.scene.title = reader.scene.id;
+  read_table(path, table, reader.top());
+  if (const toml::array* list = table["limiters"].as_array()) reader.read_limiters(path, *list);
+  if (const toml::array* list = table["demand"].as_array()) reader.read_demands(path, *list);
+  if (const toml::table* shaft = table["shaft"].as_table()) reader.read_shaft(path + ": shaft", *shaft);
+  for (const std::string& text : overrides) reader.apply(text);
+  reader.scene.seed = static_cast<unsigned>(reader.seed);
+  return reader.scene;
+}
+
+double demand_A(const Scene& scene, int axis, double time_s) {
+  for (const Demand& d : scene.demands) {
+    if (d.axis != axis || time_s < d.from_s || time_s >= d.to_s) continue;
+    return d.current_A * (1 + d.ripple_ratio * std::sin(2 * std::numbers::pi * d.frequency_Hz * time_s));
+  }
+  return 0;
+}
+
+}  // namespace boards::host

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "boards/host/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "boards/host/optimum.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace {
+
+using boards::host::Demand;
+using boards::host::read_scene;
+using boards::host::Scene;
+
+const std::string folder = HOTCORE_SOURCE_DIR "/host-sim/scenes";
+
+std::string complaint(const std::string& which, const std::vector<std::string>& overrides = {}) {
+  try {
+    read_scene(which, folder, overrides);
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    return error.what();
+  }
+  ADD_FAILURE() << which << " was read without a complaint";
+  return "";
+}
+
+std::string complaint_about(const std::string& text) {
+  const std::string path = std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".toml";
+  std::ofstream(path) << text;
+  return complaint(path);
+}
+
+TEST(Scene, EverySceneOfTheIssueIsThere) {
+  for (const char* name : {"jump", "get-up", "stall", "hold", "walk-loaded", "water-cooled"}) {
+    const Scene scene = read_scene(name, folder, {});
+    EXPECT_FALSE(scene.demands.empty()) << name;
+    EXPECT_GT(scene.seconds, 0) << name;
+  }
+}
+
+TEST(Scene, AKeyCanBeSetFromTheCommandLine) {
+  const Scene scene = read_scene("stall", folder, {"shaft.angle_rad=0.5", "seed=7", "motor=ec-powermax-30-24v"});
+  EXPECT_DOUBLE_EQ(scene.shaft.angle_rad, 0.5);
+  EXPECT_EQ(scene.seed, 7u);
+  EXPECT_EQ(scene.motor, "ec-powermax-30-24v");
+}
+
+TEST(Scene, MistakesAreAnsweredWithTheNearestName) {
+  EXPECT_NE(complaint("jmp").find("did you mean 'jump'?"), std::string::npos);
+  EXPECT_NE(complaint("stall", {"secondz=3"}).find("did you mean 'seconds'?"), std::string::npos);
+  EXPECT_NE(complaint("stall", {"shaft.angle=3"}).find("did you mean 'angle_rad'?"), std::string::npos);
+  EXPECT_NE(complaint("stall", {"seconds"}).find("key=value"), std::string::npos);
+  EXPECT_NE(complaint("stall", {"seconds=soon"}).find("not a number"), std::string::npos);
+  EXPECT_NE(complaint("stall", {"seconds=nan"}).find("out of range"), std::string::npos);
+  EXPECT_NE(complaint_about("secnds = 3").find("did you mean 'seconds'?"), std::string::npos);
+  EXPECT_NE(complaint_about("limiters = ['govenor']").find("not one of governor"), std::string::npos);
+  EXPECT_NE(complaint_about("[[demand]]\nfrom_s = 2\nto_s = 1").find("to_s must lie after from_s"), std::string::npos);
+  EXPECT_NE(complaint_about("seconds = ").find("line 1"), std::string::npos);
+}
+
+TEST(Optimum, ReachesTheLimitThenHoldsItsCurrent) {
+  Scene scene;
+  scene.seconds = 1;
+  scene.demands = {Demand{0, 0, 1, 20, 0, 0}};
+  // No copper coefficient and a housing that cannot warm: T1 = Ta + P R1 (1 - exp(-t / tau)) has a closed form.
+  const boards::host::TwoNodes motor{1, 1e9, 1, 1e12, 0.5, 0, 125, 0.5};
+  const double hold_A = std::sqrt(100 / 0.75), reach_s = -std::log(1 - 100 / (0.75 * 400));
+  EXPECT_NEAR(boards::host::optimal_impulse_As(scene, motor, 100), 20 * reach_s + hold_A * (1 - reach_s), 2e-3);
+  EXPECT_NEAR(boards::host::optimal_impulse_As(scene, motor, 5), 5, 1e-3);
+}
+
+}  // namespace
