@@ -4,6 +4,8 @@
 
 cmake_minimum_required(VERSION 3.25)
 
+get_filename_component(ROOT ${ROOT} ABSOLUTE)
+
 set(may_wire wire)
 set(may_hal hal wire)
 set(may_thermal thermal wire)
