@@ -7,7 +7,7 @@
 //
 //   C_n dT_n/dt = sum_links G(law) (T_other - T_n) + sum_sources gain * drive * (1 + alpha (T_n - 25))
 //
-// Templated on the scalar: double on the board, dual numbers in identify.
+// Templated on the scalar: double on the board, dual numbers in identify. Temperatures in degC, w in rad/s.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,8 @@ enum class Drive : std::uint8_t {
   current2_speed2,  // |i|^2 w^2
   current_speed,    // |i| |w|
   enabled,          // share of the time the bridge switched
-  power_W,          // heat measured elsewhere
+  power_W,          // heat known from elsewhere: measured, or from bus power (sensor set B)
+  speed_to_0_8,     // mean of |w|^0.8, for forced convection
   count
 };
 inline constexpr int drive_count = static_cast<int>(Drive::count);
@@ -44,9 +45,23 @@ inline constexpr int drive_count = static_cast<int>(Drive::count);
 enum class LinkLaw : std::uint8_t {
   constant,            // G
   speed,               // G (1 + k w^0.8)            forced convection, w in rad/s
-  natural_convection,  // G (|dT| / 20 K)^k
-  radiation,           // G (Ta^4 - Tb^4) / (4 (300 K)^3 (Ta - Tb))
+  natural_convection,  // G (|dT| / 20 K)^k, |dT| rounded off below 0.1 K
+  radiation,           // G (Ta^4 - Tb^4) / (4 (300 K)^3 (Ta - Tb)), in kelvin: G is the conductance at 300 K
   temperature,         // G / (1 + k (T_from - 40 degC))   a contact that changes as it warms
+  count
+};
+
+/// What happens during one step: means of the drives over it, and the boundary temperatures. Unused ones stay 0.
+/// Data is double, or a dual number where a boundary or a drive is itself being fitted.
+template <class Data = double>
+struct HeatInput {
+  Data drive[drive_count] = {};
+  Data boundary_degC[boundary_count] = {};
+
+  Data& operator[](Drive d) { return drive[static_cast<int>(d)]; }
+  const Data& operator[](Drive d) const { return drive[static_cast<int>(d)]; }
+  Data& operator[](Boundary b) { return boundary_degC[static_cast<int>(b)]; }
+  const Data& operator[](Boundary b) const { return boundary_degC[static_cast<int>(b)]; }
 };
 
 /// End of a link: a node (0..node_count-1) or a boundary (boundary_end(...)).
@@ -65,8 +80,8 @@ template <class Scalar>
 struct Link {
   std::int8_t from, to;
   LinkLaw law;
-  Scalar conductance_W_per_K;
-  Scalar k;  // parameter of the law, 0 where it has none
+  Scalar conductance_W_per_K;  // zero is allowed and carries nothing
+  Scalar k;                    // parameter of the law, 0 where it has none
 };
 
 template <class Scalar>
