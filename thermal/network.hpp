@@ -125,6 +125,40 @@ class HeatNetwork {
     return s + a_.lazyProduct(degC);
   }
 
+  /// dT/dt told apart by where the heat comes from, K/s: what the covariance needs.
+  struct Rates {
+    Vector sources, inner, outer;  // sources; links between nodes; links to boundaries (all curved laws count here)
+    Vector source_slope_per_s;     // d sources / dT
+  };
+
+  template <class Data>
+  Rates rates(const Vector& degC, const HeatInput<Data>& input) const {
+    Vector base = Vector::Zero(n_), slope = Vector::Zero(n_);
+    gather(input, base, slope);
+    Rates r;
+    r.outer = Vector::Zero(n_);
+    for (int i = 0; i < boundary_count_; ++i) {
+      const BoundaryTerm& b = boundaries_[i];
+      const Scalar given = b.per_s * input.boundary_degC[b.boundary];
+      base[b.node] -= given;
+      r.outer[b.node] += given - b.per_s * degC[b.node];
+    }
+    if (curved_count_ > 0) add_curved(degC, input, r.outer);
+    r.source_slope_per_s = slope;
+    r.sources = base + slope.cwiseProduct(degC);
+    r.inner = rate_K_per_s(degC, input) - r.sources - r.outer;
+    return r;
+  }
+
+  /// d(dT/dt) / d(boundary temperature), 1/s; curved laws count with their plain G.
+  Vector boundary_gain_per_s(Boundary boundary) const {
+    Vector gain = Vector::Zero(n_);
+    for (int i = 0; i < boundary_count_; ++i) {
+      if (boundaries_[i].boundary == static_cast<int>(boundary)) gain[boundaries_[i].node] += boundaries_[i].per_s;
+    }
+    return gain;
+  }
+
   /// Heat of one node's sources, W.
   template <class Data>
   Scalar source_W(int node, const Scalar& degC, const HeatInput<Data>& input) const {

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: MIT
+#include "thermal/core_estimator.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace thermal {
+
+namespace {
+
+constexpr double dt_s = estimator_dt_s;
+constexpr float dt_f = static_cast<float>(estimator_dt_s);
+
+// Between these a temperature can be true; outside them the arithmetic or the memory is broken.
+constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
+// A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
+constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
+
+constexpr int window_steps = 50;     // the housing is heard twice a second: faster only averages its noise
+constexpr int missing_steps = 10;    // 100 ms without a reading: safety table, NTC open or short
+constexpr float most_pull_K = 5.0f;  // safety table: the estimate never falls further by the sensor
+constexpr float pull_forgotten_K_per_s = 5.0f / 1200.0f;
+constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
+constexpr float enough_movement_K = 2.0f, alive_share = 0.4f;
+constexpr float start_sigma_K = 15.0f;
+constexpr float restored_hotter_K = 10.0f;
+
+// Drift of the ambient: 2 K in an hour. Of any node: 0.1 K in a second's square root, what no parameter explains.
+constexpr float ambient_walk_K2_per_s = 4.0f / 3600.0f, node_walk_K2_per_s = 1e-2f;
+
+float squared(float x) { return x * x; }
+
+bool plausible(double degC) { return degC > coldest_degC && degC < hottest_possible_degC; }  // false for NaN
+
+constexpr bool is_current_square(int drive) {
+  return drive >= static_cast<int>(Drive::phase_a_A2) && drive <= static_cast<int>(Drive::current_A2);
+}
+
+}  // namespace
+
+float Estimate::hottest_margin_degC() const {
+  float hottest = -std::numeric_limits<float>::infinity();
+  for (int i = 0; i < node_count; ++i) {
+    if (std::isfinite(max_degC[i]) && !(margin_degC[i] <= hottest)) hottest = margin_degC[i];
+  }
+  return hottest;
+}
+
+double Estimate::hottest_degC() const {
+  double hottest = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < node_count; ++i) {
+    if (std::isfinite(max_degC[i]) && !(degC[i] <= hottest)) hottest = degC[i];
+  }
+  return hottest;
+}
+
+CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings)
+    : network_(set),
+      transition_(network_.transition(dt_s)),
+      settings_(settings),
+      housing_(set.housing),
+      n_(set.node_count),
+      ambient_degC_(static_cast<double>(settings.ambient_degC)) {
+  for (int i = 0; i < n_; ++i) max_degC_[i] = set.nodes[i].max_degC;
+  degC_ = Vector::Constant(n_, ambient_degC_);
+  good_degC_ = degC_;
+  good_ambient_degC_ = ambient_degC_;
+  sensor_degC_ = ambient_degC_;
+  input_[Boundary::ambient] = ambient_degC_;
+  for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
+  widen_all();
+  // Soaked: whatever the housing turns out to be, the winding is too.
+  p_.topLeftCorner(n_, n_).setConstant(squared(start_sigma_K));
+  p_.row(sensor()) = p_.row(housing_.node);
+  p_.col(sensor()) = p_.col(housing_.node);
+  p_(sensor(), sensor()) = squared(start_sigma_K);
+  publish();
+}
+
+/// Nothing is known about the temperatures but the state itself; the parameters stay what the trust says.
+void CoreEstimator::widen_all() {
+  p_ = Covariance::Zero(n_ + 5, n_ + 5);
+  for (int i = 0; i < n_; ++i) p_(i, i) = squared(start_sigma_K);
+  p_(ambient(), ambient()) = squared(settings_.ambient_sigma_K);
+  p_(sensor(), sensor()) = squared(start_sigma_K);
+  const float trust[3] = {settings_.trust.power, settings_.trust.inner_resistance, settings_.trust.cooling};
+  for (int i = 0; i < 3; ++i) p_(n_ + 2 + i, n_ + 2 + i) = squared(trust[i]);
+}
+
+const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
+                                    int lost_steps) {
+  flags_ &= ~(input_replaced | lost_time | state_restored);
+  if (lost_steps > 0) {
+    flags_ |= lost_time;
+    for (int i = 0; i < lost_steps && i < 200; ++i) step();
+  }
+  if (!take_input(input)) flags_ |= input_replaced;
+  ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
+                   measured_ambient.value < hottest_reading_degC;
+  if (ambient_known_) ambient_degC_ = static_cast<double>(measured_ambient.value);
+  step();
+  hear_housing(housing);
+  guard_state();
+  publish();
+  return estimate_;
+}
+
+/// Takes over what is usable; what is not becomes the last value times 1.1, a current the full scale. False if any was.
+bool CoreEstimator::take_input(const HeatInput<>& input) {
+  bool good = true;
+  for (int i = 0; i < drive_count; ++i) {
+    const double x = input.drive[i];
+    if (x >= 0.0 && std::isfinite(x)) {
+      input_.drive[i] = x;
+      continue;
+    }
+    good = false;
+    input_.drive[i] *= 1.1;
+    const double full_scale = is_current_square(i) ? static_cast<double>(settings_.full_scale_A2) : 1e4;
+    if (is_current_square(i) || !(input_.drive[i] < full_scale)) input_.drive[i] = full_scale;
+  }
+  for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) {
+    if (plausible(input[b])) {
+      input_[b] = input[b];
+    } else {
+      good = false;
+    }
+  }
+  return good;
+}
+
+void CoreEstimator::step() {
+  input_[Boundary::ambient] = ambient_degC_;
+  propagate_covariance(network_.rates(degC_, input_));
+  degC_ = network_.step(transition_, degC_, input_);
+  const double target =
+      degC_[housing_.node] * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
+  sensor_degC_ += (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
+}
+
+/// P = F P F' + Q with F = [phi0, phi1 d(rate)/d(ambient, parameters); 0, 1], and the sensor's lag as a row of its own.
+void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates) {
+  const int size = n_ + 5;
+  using Mat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, max_nodes, max_nodes>;
+  using Vec = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_nodes, 1>;
+  const Mat phi1 = transition_.phi1.cast<float>();
+  Covariance f = Covariance::Identity(size, size);
+  Mat nodes = transition_.phi0.cast<float>();
+  const Vec slope = rates.source_slope_per_s.cast<float>();
+  for (int i = 0; i < n_; ++i) nodes.col(i) += phi1.col(i) * slope[i];  // hot copper heats more
+  f.topLeftCorner(n_, n_) = nodes;
+  const auto column = [&](int index, const Vec& rate) { f.col(index).head(n_) = phi1.lazyProduct(rate); };
+  column(ambient(), network_.boundary_gain_per_s(Boundary::ambient).cast<float>());
+  column(n_ + 2, rates.sources.cast<float>());
+  column(n_ + 3, rates.inner.cast<float>());
+  column(n_ + 4, rates.outer.cast<float>());
+  const float take = 1.0f / (1.0f + static_cast<float>(housing_.lag_s) / dt_f);
+  f.row(sensor()) = f.row(housing_.node) * (take * (1.0f + static_cast<float>(housing_.gain_error)));
+  f(sensor(), sensor()) = 1.0f - take;
+
+  const Covariance fp = f.lazyProduct(p_);
+  p_ = fp.lazyProduct(f.transpose());
+  for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
+  p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
+  if (ambient_known_) {
+    p_.row(ambient()).setZero();
+    p_.col(ambient()).setZero();
+    p_(ambient(), ambient()) = 1.0f;  // a sensor beside the motor is good to 1 K
+  }
+}
+
+/// Gathers half a second of readings, watches whether they move as the model does, and then lets them correct.
+void CoreEstimator::hear_housing(Reading housing) {
+  const float leak = dt_f / movement_memory_s;
+  const float sensor_degC = static_cast<float>(sensor_degC_);
+  model_moved_K_ += sensor_degC - last_sensor_degC_ - leak * model_moved_K_;
+  last_sensor_degC_ = sensor_degC;
+  pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
+
+  const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
+  if (!usable) {
+    if (silent_ < missing_steps) ++silent_;
+    if (silent_ == missing_steps && !(flags_ & housing_missing)) {
+      flags_ |= housing_missing;
+      p_(housing_.node, housing_.node) += squared(3.0f);
+      p_(ambient(), ambient()) += squared(3.0f);
+    }
+    window_ = heard_ = 0;
+    reading_sum_ = sensor_sum_ = 0.0;
+    return;
+  }
+  silent_ = 0;
+  flags_ &= ~static_cast<std::uint32_t>(housing_missing);
+  ++heard_;
+  reading_sum_ += static_cast<double>(housing.value);
+  sensor_sum_ += sensor_degC_;
+  if (++window_ < window_steps) return;
+
+  const float reading_degC = static_cast<float>(reading_sum_ / heard_);
+  const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / heard_);
+  window_ = heard_ = 0;
+  reading_sum_ = sensor_sum_ = 0.0;
+  if (!acquired_) {
+    reading_slow_degC_ = reading_degC;
+    // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
+    if (!ambient_known_ && static_cast<double>(reading_degC) < ambient_degC_) {
+      ambient_degC_ = static_cast<double>(reading_degC > 20.0f ? reading_degC : 20.0f);
+    }
+  }
+  reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
+  reading_moved_K_ = reading_degC - reading_slow_degC_;
+  correct_by_housing(innovation_K);
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // the correction is not a movement of the model
+}
+
+void CoreEstimator::correct_by_housing(float innovation_K) {
+  Row seen = Row::Zero(n_ + 5);
+  seen[sensor()] = 1.0f;
+  const float noise = squared(settings_.housing_noise_K);
+  if (!acquired_) {
+    acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity());
+    return;
+  }
+  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + noise);
+  const float gate_K = 4.0f * sigma_K > most_pull_K ? 4.0f * sigma_K : most_pull_K;
+  bool believed = innovation_K > -gate_K;
+  if (believed && pulled_K_ >= most_pull_K) {
+    // The budget is used up. A sensor that moved with the load has earned a new one; one that stood still has not.
+    const float expected = std::abs(model_moved_K_);
+    const float moved = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
+    if (expected >= enough_movement_K && moved >= alive_share * expected) pulled_K_ = 0.0f;
+    if (innovation_K < 0.0f && pulled_K_ >= most_pull_K) believed = innovation_K > -sigma_K;
+  }
+  if (!believed) {
+    if (!(flags_ & housing_contradicts)) {
+      p_(housing_.node, housing_.node) += squared(3.0f);
+      p_(ambient(), ambient()) += squared(3.0f);
+    }
+    flags_ |= housing_contradicts;
+    return;
+  }
+  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
+  const float left_K = most_pull_K - pulled_K_;
+  correct(seen, innovation_K, noise, left_K > 0.0f ? left_K : 0.0f);
+}
+
+/// How far a correction lowers the winding, K; negative if it raises all of them.
+float CoreEstimator::down_by(const Row& gain, float innovation_K) const {
+  float down_K = -std::numeric_limits<float>::infinity();
+  for (int i = 0; i < n_; ++i) {
+    const float fall_K = -gain[i] * innovation_K;
+    if (std::isfinite(max_degC_[i]) && fall_K > down_K) down_K = fall_K;
+  }
+  return down_K;
+}
+
+/// Schmidt-Kalman correction in Joseph form, shortened so that it lowers no winding by more than most_down_K.
+bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K) {
+  const Row shared = p_.lazyProduct(seen);
+  const float expected_K2 = seen.dot(shared) + variance_K2;
+  if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
+  Row gain = shared / expected_K2;
+  gain.tail(3).setZero();  // a housing reading does not teach parameters
+  if (ambient_known_) gain[ambient()] = 0.0f;
+  const float down_K = down_by(gain, innovation_K);
+  if (down_K > most_down_K) gain *= most_down_K / down_K;
+  if (std::isfinite(most_down_K)) {
+    const float pulled_K = pulled_K_ + down_by(gain, innovation_K);  // net: noise up and down cancels
+    pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
+  }
+
+  for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(gain[i] * innovation_K);
+  ambient_degC_ += static_cast<double>(gain[ambient()] * innovation_K);
+  sensor_degC_ += static_cast<double>(gain[sensor()] * innovation_K);
+  const Covariance keep = Covariance::Identity(n_ + 5, n_ + 5) - gain.lazyProduct(seen.transpose());
+  const Covariance half = keep.lazyProduct(p_);
+  p_ = half.lazyProduct(keep.transpose());
+  p_ += (gain * variance_K2).lazyProduct(gain.transpose());
+  p_ = ((p_ + p_.transpose()) * 0.5f).eval();
+  return true;
+}
+
+void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC,
+                                        float copper_coefficient_per_K) {
+  flags_ |= winding_ohm_refused;
+  const float ohm_per_K = ohm_at_25_degC * copper_coefficient_per_K;
+  if (!(ohm > 0.0f) || !(sigma_ohm > 0.0f) || !(ohm_per_K > 0.0f)) return;
+  const float seen_degC = 25.0f + (ohm - ohm_at_25_degC) / ohm_per_K;
+  Row seen = Row::Zero(n_ + 5);
+  int windings = 0;
+  for (int i = 0; i < n_; ++i) windings += std::isfinite(max_degC_[i]) ? 1 : 0;
+  if (windings == 0 || !plausible(static_cast<double>(seen_degC))) return;
+  double mean_degC = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    if (!std::isfinite(max_degC_[i])) continue;
+    seen[i] = 1.0f / static_cast<float>(windings);
+    mean_degC += degC_[i] / windings;
+  }
+  const float variance_K2 = squared(sigma_ohm / ohm_per_K);
+  const float expected_K = std::sqrt(seen.dot(p_.lazyProduct(seen)) + variance_K2);
+  float innovation_K = seen_degC - static_cast<float>(mean_degC);
+  const float gate_K = 4.0f * expected_K;
+  if (!(innovation_K > -gate_K)) return;
+  if (innovation_K > gate_K) innovation_K = gate_K;  // hotter than believable still counts, but one reading is only one
+  if (correct(seen, innovation_K, variance_K2, std::numeric_limits<float>::infinity())) {
+    flags_ &= ~static_cast<std::uint32_t>(winding_ohm_refused);
+  }
+  guard_state();
+  publish();
+}
+
+void CoreEstimator::raise_to(float winding_degC) {
+  if (!plausible(static_cast<double>(winding_degC))) return;
+  for (int i = 0; i < n_; ++i) {
+    if (std::isfinite(max_degC_[i]) && !(degC_[i] >= static_cast<double>(winding_degC)))
+      degC_[i] = static_cast<double>(winding_degC);
+  }
+  publish();
+}
+
+void CoreEstimator::save(float (&rise_K)[max_nodes]) const {
+  for (int i = 0; i < max_nodes; ++i) rise_K[i] = i < n_ ? static_cast<float>(degC_[i] - ambient_degC_) : 0.0f;
+}
+
+void CoreEstimator::restore(const float (&rise_K)[max_nodes], double off_s) {
+  const double believed = static_cast<double>(settings_.ambient_degC);
+  if (!(ambient_degC_ > believed)) ambient_degC_ = believed;
+  const double full_rise_K = 120.0 > believed ? 155.0 - believed : 120.0;
+  Vector rise(n_);
+  for (int i = 0; i < n_; ++i) {
+    const bool good = plausible(static_cast<double>(rise_K[i]));
+    const double limit_K = std::isfinite(max_degC_[i]) ? static_cast<double>(max_degC_[i]) - believed : full_rise_K;
+    rise[i] = good ? static_cast<double>(rise_K[i]) : limit_K;
+    if (!(rise[i] > 0.0)) rise[i] = 0.0;
+  }
+  if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
+  degC_ = rise.array() + ambient_degC_;
+  sensor_degC_ = degC_[housing_.node];
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);
+  good_degC_ = degC_;
+  good_ambient_degC_ = ambient_degC_;
+  acquired_ = false;
+  pulled_K_ = model_moved_K_ = 0.0f;
+  widen_all();
+  p_(sensor(), sensor()) = p_(housing_.node, housing_.node);  // the sensor is as warm as what it sits on
+  p_(sensor(), housing_.node) = p_(housing_.node, sensor()) = p_(housing_.node, housing_.node);
+  publish();
+}
+
+/// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call.
+void CoreEstimator::guard_state() {
+  bool good = plausible(ambient_degC_) && plausible(sensor_degC_);
+  for (int i = 0; i < n_; ++i) good = good && plausible(degC_[i]);
+  bool sure = true;
+  for (int i = 0; i < n_ + 5; ++i) sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f;
+  if (!sure) widen_all();
+  if (good) {
+    good_degC_ = degC_;
+    good_ambient_degC_ = ambient_degC_;
+    return;
+  }
+  flags_ |= state_restored;
+  for (int i = 0; i < n_; ++i) {
+    const double last = plausible(good_degC_[i]) ? good_degC_[i] : hottest_possible_degC - 100.0;
+    degC_[i] = last + static_cast<double>(restored_hotter_K);
+  }
+  ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
+  sensor_degC_ = degC_[housing_.node];
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);
+  model_moved_K_ = 0.0f;
+  good_degC_ = degC_;
+}
+
+void CoreEstimator::publish() {
+  estimate_.node_count = n_;
+  for (int i = 0; i < n_; ++i) {
+    estimate_.degC[i] = degC_[i];
+    estimate_.sigma_K[i] = std::sqrt(p_(i, i));
+    estimate_.margin_degC[i] = flags_ & state_restored
+                                   ? std::numeric_limits<float>::infinity()
+                                   : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i];
+    estimate_.max_degC[i] = max_degC_[i];
+  }
+  estimate_.housing_degC = degC_[housing_.node];
+  estimate_.ambient_degC = ambient_degC_;
+  estimate_.flags = flags_;
+}
+
+}  // namespace thermal

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// Says how hot the winding is, which no sensor can touch, and how sure it is of that.
+//
+//   in    the means of one 10 ms step (currents squared, speeds, power), the housing sensor, which may be missing
+//   out   every node's temperature, its standard deviation, and what went wrong
+//
+// State in double at 100 Hz: float at the PWM rate loses small increments and reads up to 55 K too cold. The covariance
+// is float: it is a margin, not a memory. A Schmidt-Kalman filter: errors of the sheet (power, R1, R2) make sigma grow
+// with load, are never "learned" from the housing; the ambient is a slow state, since most boards cannot measure it.
+// Everything fails towards hot. Knows neither clock nor sensor. No heap; every call costs the same but for lost time.
+// Not for an ISR.
+#pragma once
+
+#include "thermal/network.hpp"
+
+namespace thermal {
+
+inline constexpr double estimator_dt_s = 0.01;
+
+/// A measured value that may be missing; `valid` false: open, short, stale. Then the value means nothing.
+struct Reading {
+  float value;
+  bool valid;
+};
+
+/// Relative standard deviations of what the heat set claims.
+struct Trust {
+  float power;             // heat per A^2 against heat capacity: what a burst depends on
+  float inner_resistance;  // links between nodes (R1)
+  float cooling;           // links to the world (R2)
+};
+/// Catalogue values are good to 10..30 %. Identified: typical standard errors of a fit with core readings.
+inline constexpr Trust sheet_trust{0.15f, 0.20f, 0.20f};
+inline constexpr Trust identified_trust{0.02f, 0.04f, 0.05f};
+inline constexpr Trust exact_trust{0.0f, 0.0f, 0.0f};
+
+struct EstimatorSettings {
+  Trust trust = sheet_trust;
+  float margin_sigmas = 2.0f;  // k of T + k sigma: one in forty stays hotter
+  float ambient_degC = 40.0f;  // believed when nothing says otherwise: the usual rating of drives
+  float ambient_sigma_K = 5.0f;
+  float housing_noise_K = 0.5f;  // of a mean over 0.5 s, wander of a thermistor chain included
+  float full_scale_A2 = 400.0f;  // counted when a current is not a number
+};
+
+enum EstimateFlag : std::uint32_t {
+  housing_missing = 1u << 0,      // no usable reading for 100 ms
+  housing_contradicts = 1u << 1,  // colder than the model can believe: ignored until it agrees again
+  input_replaced = 1u << 2,       // a drive was not finite or negative: something hotter was taken
+  lost_time = 1u << 3,            // this call stood for more than one step
+  state_restored = 1u << 4,       // the state was not finite: last good one, 10 K hotter, for this call no allowance
+  winding_ohm_refused = 1u << 5,  // the last resistance reading was implausible
+};
+
+struct Estimate {
+  int node_count;
+  double degC[max_nodes];
+  float sigma_K[max_nodes];
+  float margin_degC[max_nodes];  // T + k sigma: what the governor limits; +infinity when the state was not finite
+  float max_degC[max_nodes];     // from the set
+  double housing_degC, ambient_degC;
+  std::uint32_t flags;
+
+  float hottest_margin_degC() const;  // of the nodes that have a limit
+  double hottest_degC() const;
+};
+
+class CoreEstimator {
+ public:
+  using Vector = HeatNetwork<double>::Vector;
+
+  /// The set must have passed validate(set, estimator_dt_s). Starts soaked at the ambient believed; the first good
+  /// housing reading moves all of it. After a reset call restore() instead of trusting that.
+  CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings);
+
+  /// One step of 10 ms. `lost_steps` (at most 200 a call; call again for more) are charged before it at the last input.
+  /// input[Boundary::ambient] is not used: give `ambient` when it is measured.
+  const Estimate& tick(const HeatInput<>& input, Reading housing, Reading ambient = {0.0f, false}, int lost_steps = 0);
+
+  /// Resistance of the winding as a thermometer: the mean over the nodes that have a limit. Refused if implausibly
+  /// cold.
+  void observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC, float copper_coefficient_per_K);
+
+  /// The host knows better only upwards.
+  void raise_to(float winding_degC);
+
+  /// Rises over ambient to keep in backup memory, K.
+  void save(float (&rise_K)[max_nodes]) const;
+  /// After a reset. A time off that is negative or NaN is unknown: then all of the saved rise counts, on an ambient of
+  /// at least the one believed. A rise that is not finite counts as the full rise to the node's limit.
+  void restore(const float (&rise_K)[max_nodes], double off_s);
+
+  const Estimate& estimate() const { return estimate_; }
+  const HeatNetwork<double>& network() const { return network_; }
+  /// The input of the last step as it was believed, ambient included.
+  const HeatInput<>& input() const { return input_; }
+
+ private:
+  static constexpr int max_states = max_nodes + 5;
+  using Covariance = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, max_states, max_states>;
+  using Row = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_states, 1>;
+
+  void widen_all();
+  bool take_input(const HeatInput<>& input);
+  void step();
+  void propagate_covariance(const HeatNetwork<double>::Rates& rates);
+  void hear_housing(Reading housing);
+  void correct_by_housing(float innovation_K);
+  bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K);
+  float down_by(const Row& gain, float innovation_K) const;
+  void guard_state();
+  void publish();
+
+  // Indices behind the nodes: ambient, sensor, errors of power, inner links, outer links.
+  int ambient() const { return n_; }
+  int sensor() const { return n_ + 1; }
+
+  HeatNetwork<double> network_;
+  Transition<double> transition_;
+  EstimatorSettings settings_;
+  HousingSensor<double> housing_;
+  int n_;
+  float max_degC_[max_nodes];
+
+  Vector degC_, good_degC_;
+  double ambient_degC_, good_ambient_degC_, sensor_degC_;
+  Covariance p_;
+  HeatInput<> input_;
+
+  // The housing sensor's record.
+  double reading_sum_ = 0.0, sensor_sum_ = 0.0;
+  int heard_ = 0, window_ = 0, silent_ = 0;
+  bool acquired_ = false, ambient_known_ = false;
+  float pulled_K_ = 0.0f;       // how far it has pulled the winding down lately
+  float model_moved_K_ = 0.0f;  // how far the model says the housing moved in about two minutes,
+  float reading_slow_degC_ = 0.0f, reading_moved_K_ = 0.0f;  // and how far the reading did
+  float last_sensor_degC_ = 0.0f;
+
+  std::uint32_t flags_ = 0;
+  Estimate estimate_{};
+};
+
+}  // namespace thermal
