@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The three doors of one axis. The core never meets them: it takes an AxisSample and returns a Duty, both plain values;
 // only a board's main loop walks through the doors. All three may be called from the control interrupt.
+//
+// Timing, centre-aligned PWM, period T:  a sample is taken at the start of a period, in the middle of a zero vector;
+// the duty computed from it loads one period later and its middle lies another half period on. The core therefore aims
+// at the rotor angle of 1.5 T after the sample. A board that is timed otherwise must not use these doors.
 #pragma once
 
 #include <concepts>
@@ -10,12 +14,16 @@
 
 namespace hal {
 
+inline constexpr float output_delay_periods = 1.5f;
+
 /// Everything the fast lane learns about one axis in one PWM period. Counts became SI units inside the board.
+/// With low-side shunts the phase of the largest duty may lack its sampling window; the other two never do, and the
+/// board makes the third from them.
 struct AxisSample {
-  wire::Abc current_A;  // phase currents, positive into the motor, sampled at the middle of the zero vector
+  wire::Abc current_A;  // phase currents, positive into the motor, after the nominal offset
   float bus_V;
-  float rotor_rad;         // mechanical angle, [0, 2 pi)
-  std::uint32_t sequence;  // rises by one each PWM period; a repeated number is an old sample
+  float rotor_rad;         // mechanical angle, [0, 2 pi], rising when the phases follow each other as a, b, c
+  std::uint32_t sequence;  // number of the PWM period: rises by one each, also over periods without a sample; may wrap
   bool valid;              // false: a conversion, a sensor or the encoder was not trustworthy
 };
 

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+#include "firmware/axis.hpp"
+
+namespace firmware {
+
+namespace {
+constexpr hal::Duty released{{0.5f, 0.5f, 0.5f}, false};
+constexpr std::uint32_t forever = 0xFFFF'FFFFu;
+}  // namespace
+
+Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating) : index_(index) {
+  const bool board_ok = plausible(rating);
+  const Finding found = validate(setup.parameters, rating);
+  if (board_ok && found.id == 0) {
+    const AxisParameters& p = setup.parameters;
+    guard_ = Guard(rating);
+    rotor_ = Rotor(p, rating);
+    setpoint_.configure(p, rating);
+    permit_ = Permit(p, rating);
+    current_loop_ = CurrentLoop(p, rating);
+    usable_ratio_ = 1.0f - rating.sampling_window_s * rating.pwm_Hz;
+    dead_time_ = DeadTime(rating.dead_time_s, rating.pwm_Hz, p.dead_time_soft_A, usable_ratio_);
+    // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
+    quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
+    offset_bound_A_ = p.offset_bound_A;
+    period_s_ = 1.0f / rating.pwm_Hz;
+    configured_ = true;
+  } else if (!board_ok || !found.missing) {
+    trip({wire::Fault::parameters, index_, found.value, static_cast<float>(found.id), 0.0f});
+  }
+}
+
+// ---- fast lane ------------------------------------------------------------------------------------------------------
+
+hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
+  if (commands_.load(std::memory_order_relaxed) != 0) obey();
+  const Sight sight = guard_.admits(sample);
+  if (sight.verdict != Verdict::fresh) return unseen(sight);
+
+  const Abc phase_A = offsets_.correct(sample.current_A);
+  const RotorAngle rotor = rotor_.follow(sample.rotor_rad, sight.periods);
+  const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample_rad));
+  add_heat(phase_A, sample.bus_V, sight.periods);
+
+  const Setpoint::Asked asked = setpoint_.follow(sight.periods);
+  if (mode_ != Mode::running || !asked.alive) return resting(sample, current_A, asked, sight.periods);
+
+  const Permitted permitted =
+      permit_.permit(asked, allowance_, allowance_age_periods_, sample.bus_V, rotor_.rad_per_s());
+  const Dq error_A = {permitted.current_A.d - current_A.d, permitted.current_A.q - current_A.q};
+  const Dq asked_V = current_loop_.ask(error_A, current_A, rotor_.electrical_rad_per_s());
+
+  const SinCos ahead = sin_cos(rotor.at_output_rad);
+  const Modulated pulses = modulate(inverse_clarke(unpark(asked_V, ahead)), sample.bus_V, usable_ratio_);
+  current_loop_.settle(error_A, asked_V, pulses.share);
+  const Abc ratio = dead_time_.compensate(pulses.ratio, inverse_clarke(unpark(permitted.current_A, ahead)));
+
+  if (!guard_.passes(ratio)) return trip(guard_.found());
+  fast_ = {current_A,
+           permitted.current_A,
+           {asked_V.d * pulses.share, asked_V.q * pulses.share},
+           ratio,
+           sample.bus_V,
+           rotor_.rad_per_s(),
+           permitted.reason != wire::Limit::none || pulses.share >= 1.0f ? permitted.reason : wire::Limit::voltage};
+  return last_ = {ratio, true};
+}
+
+/// Adds what one sample says, and charges the periods that were missed before it a tenth above the last current.
+void Axis::add_heat(const Abc& phase_A, float bus_V, std::uint32_t periods) {
+  const Abc now_A2 = {phase_A.a * phase_A.a, phase_A.b * phase_A.b, phase_A.c * phase_A.c};
+  HeatSums& sums = heat_.adding();
+  if (periods != 1) add_missed(sums, now_A2, periods - 1);
+  sums.phase_A2 = {sums.phase_A2.a + now_A2.a, sums.phase_A2.b + now_A2.b, sums.phase_A2.c + now_A2.c};
+  sums.rad_per_s += std::fabs(rotor_.rad_per_s());
+  sums.bus_V += bus_V;
+  sums.periods += 1;
+  sums.driven += last_.on ? 1u : 0u;
+  last_A2_ = now_A2;
+  allowance_age_periods_ += periods;
+}
+
+void Axis::add_missed(HeatSums& sums, const Abc& now_A2, std::uint32_t missed) {
+  const float weight = 1.21f * static_cast<float>(missed);  // 1.1 in current
+  const auto hotter = [](float x, float y) { return x > y ? x : y; };
+  sums.phase_A2.a += weight * hotter(now_A2.a, last_A2_.a);
+  sums.phase_A2.b += weight * hotter(now_A2.b, last_A2_.b);
+  sums.phase_A2.c += weight * hotter(now_A2.c, last_A2_.c);
+  sums.bus_V += fast_.bus_V * static_cast<float>(missed);
+  sums.rad_per_s += std::fabs(rotor_.rad_per_s()) * static_cast<float>(missed);
+  sums.periods += missed;
+  sums.driven += last_.on ? missed : 0u;
+}
+
+/// No sample to work with: one period goes on as it was, the second trips if the bridge could be on.
+hal::Duty Axis::unseen(const Sight& sight) {
+  sees_ = false;
+  offsets_.restart();
+  if (tripped_periods_ != forever) ++tripped_periods_;
+  if (sight.verdict == Verdict::bridged) return last_;
+  if (mode_ == Mode::ready || mode_ == Mode::running) return trip(guard_.found());
+  return last_ = released;
+}
+
+/// A good sample with nothing to drive: follows the modes, learns the offset while off.
+hal::Duty Axis::resting(const hal::AxisSample& sample, const Dq& current_A, const Setpoint::Asked& asked,
+                        std::uint32_t periods) {
+  sees_ = true;
+  fast_ = {current_A, {}, {}, released.ratio, sample.bus_V, rotor_.rad_per_s(), wire::Limit::none};
+  last_ = released;
+  if (mode_ == Mode::running) {
+    change(Event::stop);
+    fast_.limit = wire::Limit::setpoint_old;
+  } else if (mode_ == Mode::ready && asked.alive) {
+    change(Event::start);
+    current_loop_.reset();
+  } else if (mode_ == Mode::off && std::fabs(rotor_.rad_per_s()) < quiet_rad_per_s_per_V_ * sample.bus_V) {
+    const float offset_A = offsets_.learn(sample.current_A);
+    if (offset_A > offset_bound_A_) {
+      offsets_.forget();
+      return trip({wire::Fault::current_offset, index_, offset_A, offset_bound_A_, 0.0f});
+    }
+  } else {
+    offsets_.restart();
+  }
+  if (mode_ == Mode::tripped && tripped_periods_ < forever - periods) tripped_periods_ += periods;
+  return last_;
+}
+
+hal::Duty Axis::trip(const FaultRecord& found) {
+  if (mode_ != Mode::tripped) {
+    fault_ = found;
+    fault_.axis = index_;
+    tripped_periods_ = 0;
+    change(Event::trip);
+  }
+  return last_ = released;
+}
+
+// ---- commands -------------------------------------------------------------------------------------------------------
+
+wire::Status Axis::against_arming() const {
+  if (mode_ == Mode::tripped) return wire::Status::tripped;
+  if (!configured_) return wire::Status::parameters_unset;
+  if (!sees_) return wire::Status::sample_refused;
+  if (!offsets_.known()) return wire::Status::offset_unknown;
+  return wire::Status::done;
+}
+
+wire::Status Axis::arm() {
+  const wire::Status answer = against_arming();
+  if (answer == wire::Status::done) post(Command::arm);
+  return answer;
+}
+
+wire::Status Axis::clear() {
+  if (!setpoint_.is_zero()) return wire::Status::setpoint_not_zero;
+  post(Command::clear);
+  return wire::Status::done;
+}
+
+/// What was posted since the last tick, the safest first; conditions are looked at again, for they may have changed.
+void Axis::obey() {
+  const std::uint8_t posted = commands_.exchange(0);
+  const auto asked_for = [posted](Command c) { return (posted & static_cast<std::uint8_t>(c)) != 0; };
+  if (asked_for(Command::disarm)) change(Event::disarm);
+  if (asked_for(Command::clear) && setpoint_.is_zero() && fault_.fault != wire::Fault::parameters) {
+    if (mode_ == Mode::tripped) fault_ = {};
+    change(Event::clear);
+  }
+  if (asked_for(Command::arm) && mode_ == Mode::off && against_arming() == wire::Status::done) {
+    setpoint_.discard();
+    change(Event::arm);
+  }
+}
+
+FaultRecord Axis::fault() const {
+  FaultRecord record = fault_;
+  record.age_s = static_cast<float>(tripped_periods_) * period_s_;
+  return record;
+}
+
+// ---- slow lane ------------------------------------------------------------------------------------------------------
+
+void Axis::slow_tick(const hal::AxisSlowSample& sample, const hal::BoardSlowSample&, const Allowance& board) {
+  (void)heat_.take();
+  allowance_ = board;
+  allowance_age_periods_ = 0;
+  state_ = {};
+  state_.mode = mode_;
+  state_.fast = fast_;
+  state_.housing_degC = sample.housing.value_degC;
+  state_.allowance_A = allowance_.current_A;
+  state_.limit = fast_.limit;
+  state_.fault = fault();
+}
+
+}  // namespace firmware

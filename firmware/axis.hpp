@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// THE walk of one axis, in two lanes.
+//
+//   tick       every PWM period   sample -> rotor frame -> permitted current -> voltage -> duty
+//                                    |                        ^
+//                                 A^2 s by phase           amperes
+//                                    v                        |
+//   slow_tick  every 10 ms        heat network -> core temperature (+ uncertainty) -> allowance
+//
+// Two hand-overs (heat_, allowance_) and no third. Two axes are two objects. `tick` is for the control interrupt and
+// alone writes the mode; everything else is for one lower context (commands are posted, the next tick obeys). Knows no
+// board, no clock, no host. Each step stands in the file of its name.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "firmware/axis_parameters.hpp"
+#include "firmware/board_rating.hpp"
+#include "firmware/current_loop.hpp"
+#include "firmware/dead_time.hpp"
+#include "firmware/guard.hpp"
+#include "firmware/heat_sums.hpp"
+#include "firmware/mode.hpp"
+#include "firmware/modulation.hpp"
+#include "firmware/offsets.hpp"
+#include "firmware/permit.hpp"
+#include "firmware/rotor.hpp"
+#include "firmware/setpoint.hpp"
+#include "hal/axis_port.hpp"
+#include "hal/board_port.hpp"
+#include "thermal/heat_set.hpp"
+#include "wire/codes.hpp"
+
+namespace firmware {
+
+inline constexpr float slow_tick_s = 0.01f;
+
+/// One axis as it is set up: what it drives and how hot that may get.
+struct AxisSetup {
+  AxisParameters parameters;
+  thermal::HeatSet<double> heat;
+};
+
+/// What the last fast tick saw and did. Read by telemetry and the slow lane, never by the law.
+struct FastView {
+  Dq current_A{};    // measured
+  Dq permitted_A{};  // the reference of the current loop
+  Dq voltage_V{};    // that reached the bridge, before dead-time compensation
+  Abc ratio{0.5f, 0.5f, 0.5f};
+  float bus_V = 0.0f;
+  float rad_per_s = 0.0f;  // mechanical
+  wire::Limit limit = wire::Limit::none;
+};
+
+/// Everything about an axis, once per slow tick.
+struct AxisState {
+  Mode mode = Mode::off;
+  FastView fast;
+  float core_degC[3]{};                   // estimated, by phase winding
+  float core_sigma_K = 0.0f;              // of the hottest
+  float housing_degC = 0.0f;              // estimated
+  float allowance_A = 0.0f;               // amplitude, the smallest of core and board
+  wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
+  float seconds_left = 0.0f;              // at the present current until the core limit; +infinity: never
+  FaultRecord fault;
+};
+
+class Axis {
+ public:
+  Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating);
+  Axis(const Axis&) = delete;
+  Axis& operator=(const Axis&) = delete;
+
+  /// Control interrupt, every PWM period, also while off: the duty for the next period.
+  [[nodiscard]] hal::Duty tick(const hal::AxisSample& sample) noexcept;
+
+  /// Every 10 ms, from one context below the control interrupt. `board`: the power stage's share for this axis.
+  void slow_tick(const hal::AxisSlowSample& sample, const hal::BoardSlowSample& board_sample, const Allowance& board);
+
+  /// Current command, amperes of phase amplitude (id, iq); keeps the axis alive for setpoint_timeout_s. Wakes an armed
+  /// axis.
+  wire::Status set_current(const Dq& current_A) { return setpoint_.set(current_A); }
+
+  /// off -> ready. Only setpoints that come later count. The answer says what speaks against it; done = posted.
+  wire::Status arm();
+  /// Any mode but tripped -> off: bridge open at the next tick.
+  void disarm() { post(Command::disarm); }
+  /// tripped -> off, if the last setpoint is zero.
+  wire::Status clear();
+
+  /// Live: as of the last tick.
+  Mode mode() const { return mode_; }
+  const FastView& fast() const { return fast_; }
+  FaultRecord fault() const;
+  const Abc& current_offset_A() const { return offsets_.offset_A(); }
+
+  /// As of the last slow tick.
+  const AxisState& state() const { return state_; }
+
+ private:
+  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4 };
+
+  void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
+  wire::Status against_arming() const;
+  [[gnu::noinline]] void obey();
+  [[gnu::noinline]] hal::Duty unseen(const Sight& sight);
+  [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, const Dq& current_A, const Setpoint::Asked& asked,
+                                      std::uint32_t periods);
+  [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
+  void add_heat(const Abc& phase_A, float bus_V, std::uint32_t periods);
+  [[gnu::noinline]] void add_missed(HeatSums& sums, const Abc& now_A2, std::uint32_t missed);
+  void change(Event event) { mode_ = next(mode_, event); }
+
+  // The two hand-overs between the lanes.
+  HeatHandOver heat_;
+  Allowance allowance_{0.0f, wire::Limit::thermal_late};
+
+  // Fast lane, in the order of the walk.
+  Guard guard_;
+  Offsets offsets_;
+  Rotor rotor_;
+  Setpoint setpoint_;
+  Permit permit_;
+  CurrentLoop current_loop_;
+  DeadTime dead_time_;
+  float usable_ratio_ = 1.0f;  // 1 - sampling window
+  hal::Duty last_{{0.5f, 0.5f, 0.5f}, false};
+  Mode mode_ = Mode::off;
+  bool configured_ = false;             // the parameter set is complete and valid
+  bool sees_ = false;                   // the last sample was admitted
+  float quiet_rad_per_s_per_V_ = 0.0f;  // below it the back-EMF cannot push current through the diodes
+  float offset_bound_A_ = 0.0f;
+  Abc last_A2_{0.0f, 0.0f, 0.0f};
+  std::uint32_t allowance_age_periods_ = 0;
+
+  // Outward.
+  std::uint32_t tripped_periods_ = 0;
+  float period_s_ = 0.0f;
+  FaultRecord fault_;
+  FastView fast_;
+  AxisState state_;
+  std::atomic<std::uint8_t> commands_{0};
+  std::uint8_t index_;
+};
+
+}  // namespace firmware

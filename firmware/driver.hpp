@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// The whole driver: two axes on one power stage. A board's control interrupt calls axis(i).tick for each axis, its main
+// loop calls slow_tick every 10 ms; nothing else couples the axes but the heat of the board they share.
+// No statics, no heap: a board owns one Driver, a PC may own many.
+#pragma once
+
+#include "firmware/axis.hpp"
+
+namespace firmware {
+
+inline constexpr int axis_count = 2;
+
+struct DriverSetup {
+  BoardRating rating;
+  AxisSetup axes[axis_count];
+};
+
+class Driver {
+ public:
+  explicit Driver(const DriverSetup& setup);
+
+  Axis& axis(int index) { return axes_[index]; }
+  const Axis& axis(int index) const { return axes_[index]; }
+
+  /// Every 10 ms, from one context below the control interrupt.
+  void slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]);
+
+ private:
+  float continuous_A_;
+  Axis axes_[axis_count];
+};
+
+}  // namespace firmware
