@@ -1,15 +1,49 @@
 // SPDX-License-Identifier: MIT
 #include "firmware/axis.hpp"
 
+#include <cmath>
+
+#include "thermal/losses.hpp"
+#include "thermal/validate.hpp"
+
 namespace firmware {
 
 namespace {
 constexpr hal::Duty released{{0.5f, 0.5f, 0.5f}, false};
 constexpr std::uint32_t forever = 0xFFFF'FFFFu;
+constexpr float blind_share = 0.6f;    // of the continuous current: reaction R2
+constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
+constexpr float nothing_degC = 1e30f;  // above any limit
+constexpr float slow_Hz = 100.0f;
+
+bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
+
+/// A set that is refused must not even be looked at: the estimator gets a node that is nothing but ambient.
+thermal::HeatSet<double> usable_or_nothing(const thermal::HeatSet<double>& set) {
+  if (usable(set)) return set;
+  thermal::HeatSet<double> nothing{};
+  nothing.node_count = nothing.link_count = 1;
+  nothing.nodes[0] = {1.0, nothing_degC};
+  nothing.links[0] = {0, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, 1.0, 0.0};
+  return nothing;
+}
+
+thermal::GovernorSettings governor_settings(const BoardRating& rating) {
+  thermal::GovernorSettings settings;
+  settings.max_A = rating.peak_A;
+  return settings;
+}
 }  // namespace
 
-Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating) : index_(index) {
-  const bool board_ok = plausible(rating);
+Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating)
+    : core_(usable_or_nothing(setup.heat), setup.estimator),
+      governor_(governor_settings(rating)),
+      peak_A_(rating.peak_A),
+      blind_A_(blind_share * rating.continuous_A),
+      blind_cap_A_(rating.peak_A),
+      senses_housing_(setup.senses_housing),
+      index_(index) {
+  const bool board_ok = plausible(rating) && usable(setup.heat);
   const Finding found = validate(setup.parameters, rating);
   if (board_ok && found.id == 0) {
     const AxisParameters& p = setup.parameters;
@@ -23,6 +57,8 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
     // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
     quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
     offset_bound_A_ = p.offset_bound_A;
+    inductance_H_ = 0.5f * (p.inductance_d_H + p.inductance_q_H);
+    pwm_Hz_ = rating.pwm_Hz;
     period_s_ = 1.0f / rating.pwm_Hz;
     configured_ = true;
   } else if (!board_ok || !found.missing) {
@@ -182,17 +218,94 @@ FaultRecord Axis::fault() const {
 
 // ---- slow lane ------------------------------------------------------------------------------------------------------
 
-void Axis::slow_tick(const hal::AxisSlowSample& sample, const hal::BoardSlowSample&, const Allowance& board) {
-  (void)heat_.take();
-  allowance_ = board;
+void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) {
+  const HeatSums sums = heat_.take();
+  input_ = heat_input(sums);
+  const int steps = static_cast<int>(static_cast<float>(sums.periods) * period_s_ * slow_Hz + 0.5f);
+  core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps - 1);
+  allowance_ = permitted_by(governor_.tick(core_), board);
   allowance_age_periods_ = 0;
-  state_ = {};
-  state_.mode = mode_;
-  state_.fast = fast_;
-  state_.housing_degC = sample.housing.value_degC;
-  state_.allowance_A = allowance_.current_A;
-  state_.limit = fast_.limit;
-  state_.fault = fault();
+  publish();
+}
+
+/// Means over the step. No sample at all: what went on before, as long as the bridge is on.
+thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
+  thermal::HeatInput<> input{};
+  if (sums.periods == 0) {
+    if (mode_ == Mode::running) return input_;
+  } else {
+    const float share = 1.0f / static_cast<float>(sums.periods);
+    const float enabled = static_cast<float>(sums.driven) * share;
+    // Ripple that sampling in the zero vector cannot see, from the last duty; half of its square in each phase.
+    const float ripple_A2 = enabled * thermal::ripple_A2(fast_.ratio, sums.bus_V * share, inductance_H_, pwm_Hz_);
+    const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    double vector_A2 = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const double one_A2 = static_cast<double>(phase_A2[k] + 0.5f * ripple_A2);
+      input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;
+      vector_A2 += one_A2 / 1.5;
+    }
+    input[thermal::Drive::current_A2] = vector_A2;
+    input[thermal::Drive::current_A] = std::sqrt(vector_A2);
+    input[thermal::Drive::enabled] = static_cast<double>(enabled);
+    thermal::set_speed(input, static_cast<double>(sums.rad_per_s * share), vector_A2);
+  }
+  input[thermal::Drive::one] = 1.0;
+  // Nobody measures these here: as warm as the surroundings are believed to be.
+  const double around_degC = core_.estimate().ambient_degC;
+  input[thermal::Boundary::coolant] = around_degC;
+  input[thermal::Boundary::frame] = around_degC;
+  input[thermal::Boundary::neighbour] = around_degC;
+  return input;
+}
+
+/// The smallest of core, board, and what is left without a housing reading; NaN allows nothing.
+Allowance Axis::permitted_by(const thermal::Allowance& core, const Allowance& board) {
+  const bool blind = senses_housing_ && (core_.estimate().flags & thermal::housing_missing) != 0;
+  const float aim_A = blind ? blind_A_ : peak_A_, step_A = blind_slope * peak_A_;
+  if (blind_cap_A_ > aim_A + step_A)
+    blind_cap_A_ -= step_A;
+  else if (blind_cap_A_ < aim_A - step_A)
+    blind_cap_A_ += step_A;
+  else
+    blind_cap_A_ = aim_A;
+
+  Allowance least{configured_ ? peak_A_ : 0.0f, wire::Limit::hardware};
+  const auto lower = [&least](float current_A, wire::Limit reason) {
+    if (current_A >= least.current_A) return;
+    least = {current_A > 0.0f ? current_A : 0.0f, reason};
+  };
+  lower(core.current_A, core.limit);
+  lower(board.current_A, board.reason);
+  lower(blind_cap_A_, wire::Limit::blind);
+  return least;
+}
+
+float Axis::current2_A2() const { return static_cast<float>(input_[thermal::Drive::current_A2]); }
+
+void Axis::publish() {
+  const thermal::Estimate& now = core_.estimate();
+  AxisState state;
+  state.mode = mode_;
+  state.fast = fast_;
+  int winding = 0;
+  float hottest_degC = -nothing_degC;
+  for (int i = 0; i < now.node_count; ++i) {
+    if (!(now.max_degC[i] < nothing_degC)) continue;
+    const float degC = static_cast<float>(now.degC[i]);
+    if (winding < 3) state.core_degC[winding++] = degC;
+    if (!(degC <= hottest_degC)) {
+      hottest_degC = degC;
+      state.core_sigma_K = now.sigma_K[i];
+    }
+  }
+  for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];
+  state.housing_degC = static_cast<float>(now.housing_degC);
+  state.allowance_A = allowance_.current_A;
+  state.limit = fast_.limit;
+  state.estimate_flags = now.flags;
+  state.fault = fault();
+  state_ = state;
 }
 
 }  // namespace firmware

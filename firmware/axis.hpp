@@ -29,17 +29,18 @@
 #include "firmware/setpoint.hpp"
 #include "hal/axis_port.hpp"
 #include "hal/board_port.hpp"
-#include "thermal/heat_set.hpp"
+#include "thermal/core_estimator.hpp"
+#include "thermal/governor.hpp"
 #include "wire/codes.hpp"
 
 namespace firmware {
-
-inline constexpr float slow_tick_s = 0.01f;
 
 /// One axis as it is set up: what it drives and how hot that may get.
 struct AxisSetup {
   AxisParameters parameters;
   thermal::HeatSet<double> heat;
+  thermal::EstimatorSettings estimator{};
+  bool senses_housing = true;  // false: model alone. true and no reading: at most 60 % of the continuous current
 };
 
 /// What the last fast tick saw and did. Read by telemetry and the slow lane, never by the law.
@@ -57,12 +58,12 @@ struct FastView {
 struct AxisState {
   Mode mode = Mode::off;
   FastView fast;
-  float core_degC[3]{};                   // estimated, by phase winding
+  float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
   float core_sigma_K = 0.0f;              // of the hottest
   float housing_degC = 0.0f;              // estimated
-  float allowance_A = 0.0f;               // amplitude, the smallest of core and board
+  float allowance_A = 0.0f;               // amplitude, the smallest of core, board and what blindness leaves
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
-  float seconds_left = 0.0f;              // at the present current until the core limit; +infinity: never
+  std::uint32_t estimate_flags = 0;       // thermal::EstimateFlag
   FaultRecord fault;
 };
 
@@ -75,8 +76,8 @@ class Axis {
   /// Control interrupt, every PWM period, also while off: the duty for the next period.
   [[nodiscard]] hal::Duty tick(const hal::AxisSample& sample) noexcept;
 
-  /// Every 10 ms, from one context below the control interrupt. `board`: the power stage's share for this axis.
-  void slow_tick(const hal::AxisSlowSample& sample, const hal::BoardSlowSample& board_sample, const Allowance& board);
+  /// Every 10 ms, from one context below the control interrupt. `board`: what the shared power stage leaves this axis.
+  void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board);
 
   /// Current command, amperes of phase amplitude (id, iq); keeps the axis alive for setpoint_timeout_s. Wakes an armed
   /// axis.
@@ -97,6 +98,8 @@ class Axis {
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
+  const thermal::Estimate& estimate() const { return core_.estimate(); }
+  float current2_A2() const;  // mean of |i|^2 over the last slow tick, ripple included: what heats the power stage
 
  private:
   enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4 };
@@ -110,6 +113,9 @@ class Axis {
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
   void add_heat(const Abc& phase_A, float bus_V, std::uint32_t periods);
   [[gnu::noinline]] void add_missed(HeatSums& sums, const Abc& now_A2, std::uint32_t missed);
+  thermal::HeatInput<> heat_input(const HeatSums& sums) const;
+  Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
+  void publish();
   void change(Event event) { mode_ = next(mode_, event); }
 
   // The two hand-overs between the lanes.
@@ -133,6 +139,15 @@ class Axis {
   float offset_bound_A_ = 0.0f;
   Abc last_A2_{0.0f, 0.0f, 0.0f};
   std::uint32_t allowance_age_periods_ = 0;
+
+  // Slow lane, in the order of the walk.
+  thermal::CoreEstimator core_;
+  thermal::Governor governor_;
+  thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
+  float inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
+  float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
+  float blind_cap_A_;       // and what it leaves now
+  bool senses_housing_;
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;

@@ -26,7 +26,7 @@ class Driver {
   void slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]);
 
  private:
-  float continuous_A_;
+  float peak_A_;
   Axis axes_[axis_count];
 };
 
