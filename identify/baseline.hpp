@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// The two-resistor model alone: fitted, judged, and said in words. What the search for causes starts from.
+#pragma once
+
+#include "identify/report.hpp"
+
+namespace identify {
+
+/// Part of a problem that the fit may not see.
+struct HoldOut {
+  std::vector<Log> logs;     // whole logs, or none
+  double fraction = 0;       // last part of each log, 0: none
+};
+
+/// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots).
+Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, Report& report);
+
+Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
+
+/// A problem whose readings after (1 - fraction) of each log are masked, and the opposite (only those are kept).
+Problem first_part(const Problem& problem, double fraction);
+Problem last_part(const Problem& problem, double fraction);
+
+/// Parameter lines of base and causes.
+std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
+
+/// Why no winding temperature may be stated, empty when it may.
+std::string core_refusal(const Problem& problem, const Fit& fit);
+
+}  // namespace identify

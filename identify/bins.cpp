@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+#include "identify/bins.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+namespace {
+
+using thermal::Boundary;
+using thermal::Drive;
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double stalled_rad_per_s = 2;
+constexpr std::size_t most_bins = 200000;
+
+double& at(Bin& bin, Drive d) { return bin.drive[static_cast<int>(d)]; }
+
+/// Missing cells replaced by the line between their neighbours.
+std::vector<double> bridged(std::vector<double> v, const std::vector<double>& t) {
+  std::size_t last = v.size();
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    if (last == v.size()) {
+      for (std::size_t k = 0; k < i; ++k) v[k] = v[i];
+    } else if (i > last + 1) {
+      for (std::size_t k = last + 1; k < i; ++k) {
+        const double share = t[i] > t[last] ? (t[k] - t[last]) / (t[i] - t[last]) : 0;
+        v[k] = v[last] + share * (v[i] - v[last]);
+      }
+    }
+    last = i;
+  }
+  for (std::size_t k = last + 1; last < v.size() && k < v.size(); ++k) v[k] = v[last];
+  return v;
+}
+
+double median(std::vector<double> v) {
+  if (v.empty()) return 0;
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+/// White noise of one reading. Second differences ignore slopes; the median ignores steps and the rest.
+double reading_noise(const std::vector<double>& v) {
+  std::vector<double> seen, second;
+  for (const double x : v) {
+    if (!std::isnan(x)) seen.push_back(x);
+  }
+  double sum = 0;
+  for (std::size_t i = 2; i < seen.size(); ++i) second.push_back(std::abs(seen[i] - 2 * seen[i - 1] + seen[i - 2]));
+  const double middle = median(second);
+  for (const double d : second) sum += std::min(d, 5 * middle) * std::min(d, 5 * middle);
+  // A coarse channel repeats itself: the median is then zero and the mean square of the differences must do.
+  if (middle <= 0) {
+    for (const double d : second) sum += d * d;
+    return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));
+  }
+  return middle / (0.6745 * std::sqrt(6.0));
+}
+
+struct Inputs {
+  std::vector<double> amplitude_A, signed_A, power_W, speed, boundary[thermal::boundary_count];
+};
+
+Inputs inputs_of(const Log& log, Bins& out) {
+  const auto& t = log.of(Role::time);
+  Inputs in;
+  const double amplitude_per_direct = 2 / std::sqrt(3.0);
+  if (log.has(Role::current)) {
+    in.signed_A = bridged(log.of(Role::current), t);
+    for (double& i : in.signed_A) i *= amplitude_per_direct;
+    in.amplitude_A = in.signed_A;
+    for (double& i : in.amplitude_A) i = std::abs(i);
+  } else if (log.has(Role::iq) && log.has(Role::id)) {
+    in.signed_A = bridged(log.of(Role::iq), t);
+    in.amplitude_A = bridged(log.of(Role::id), t);
+    for (std::size_t k = 0; k < t.size(); ++k) in.amplitude_A[k] = std::hypot(in.amplitude_A[k], in.signed_A[k]);
+  } else {
+    in.signed_A = in.amplitude_A = std::vector<double>(t.size(), 0.0);
+  }
+  out.has_power = log.has(Role::power);
+  in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
+  out.has_speed = log.has(Role::speed);
+  in.speed = out.has_speed ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);
+
+  const bool coolant = log.has(Role::coolant);
+  out.has_ambient = coolant || log.has(Role::ambient);
+  std::vector<double> sink;
+  if (out.has_ambient) {
+    sink = bridged(log.of(coolant ? Role::coolant : Role::ambient), t);
+    if (coolant) out.notes.push_back("The coolant is taken as the sink.");
+  } else {
+    const auto& y = log.of(log.has(Role::housing) ? Role::housing : Role::core);
+    const auto first = std::find_if(y.begin(), y.end(), [](double x) { return !std::isnan(x); });
+    sink.assign(t.size(), *first);
+    out.notes.push_back(fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
+  }
+  for (auto& b : in.boundary) b = sink;
+  if (log.has(Role::frame)) in.boundary[static_cast<int>(Boundary::frame)] = bridged(log.of(Role::frame), t), out.has_frame = true;
+  if (log.has(Role::neighbour)) {
+    in.boundary[static_cast<int>(Boundary::neighbour)] = bridged(log.of(Role::neighbour), t);
+    out.has_neighbour = true;
+  }
+  return in;
+}
+
+void add_readings(Bins& out, const Log& log, Role role, double Bin::*value, float Bin::*where, float Bin::*number) {
+  const auto& t = log.of(Role::time);
+  const auto& y = log.of(role);
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    if (std::isnan(y[i])) continue;
+    const double place = t[i] / out.width_s;
+    const auto b = static_cast<std::size_t>(place + 1e-9);
+    if (b >= out.bins.size()) continue;
+    Bin& bin = out.bins[b];
+    bin.*value = bin.*number == 0 ? y[i] : bin.*value + y[i];
+    bin.*where += static_cast<float>(std::max(0.0, place - static_cast<double>(b)));
+    bin.*number += 1;
+  }
+  for (Bin& bin : out.bins) {
+    if (bin.*number == 0) continue;
+    bin.*value /= static_cast<double>(bin.*number);
+    bin.*where /= bin.*number;
+  }
+}
+
+}  // namespace
+
+Bins bins_of(const Log& log, double finest_s) {
+  Bins out;
+  out.name = log.name;
+  out.missing_share = log.missing_share;
+  out.gap_share = log.gap_share;
+  out.notes = log.notes;
+  const auto& t = log.of(Role::time);
+  std::vector<double> spacing;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
+  const double usual_s = median(spacing);
+  const double duration_s = t.back();
+  if (!(usual_s > 0) || t.size() < 30) {
+    throw wire::pc::UserError(wire::pc::Exit::unusable, fmt::format("{}: {} rows over {:.1f} s are too few to fit a motor; record some minutes.",
+                                                                    log.name, t.size(), duration_s));
+  }
+  out.width_s = std::max({usual_s, std::min(2.0, finest_s), duration_s / static_cast<double>(most_bins)});
+  // A whole number of samples a bin, so that all bins hold equally many.
+  out.width_s = usual_s * std::max(1.0, std::round(out.width_s / usual_s));
+
+  const Inputs in = inputs_of(log, out);
+  const auto count = static_cast<std::size_t>((duration_s + usual_s) / out.width_s + 1e-6);
+  out.bins.assign(std::max<std::size_t>(count, 1), Bin{});
+  std::vector<double> covered(out.bins.size(), 0.0);
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const double end = i + 1 < t.size() ? t[i + 1] : t[i] + usual_s;
+    const double a = in.amplitude_A[i], w = std::abs(in.speed[i]), a2 = a * a, w08 = w > 0 ? std::pow(w, 0.8) : 0;
+    double from = t[i];
+    for (auto b = static_cast<std::size_t>(from / out.width_s + 1e-9); b < out.bins.size() && from < end; ++b) {
+      const double to = std::min(end, out.width_s * static_cast<double>(b + 1));
+      const double share = std::max(0.0, to - from) / out.width_s;
+      Bin& bin = out.bins[b];
+      covered[b] += share;
+      at(bin, Drive::one) += share;
+      at(bin, Drive::current_A2) += share * a2;
+      at(bin, Drive::current_A) += share * a;
+      at(bin, Drive::speed_rad_per_s) += share * w;
+      at(bin, Drive::speed2_rad2_per_s2) += share * w * w;
+      at(bin, Drive::speed3_rad3_per_s3) += share * w * w * w;
+      at(bin, Drive::current2_speed2) += share * a2 * w * w;
+      at(bin, Drive::current_speed) += share * a * w;
+      at(bin, Drive::enabled) += share * (a > 0 || w > 0 ? 1 : 0);
+      at(bin, Drive::power_W) += share * in.power_W[i];
+      bin.signed_A += share * in.signed_A[i];
+      bin.speed08 += share * w08;
+      bin.speed_signed += share * in.speed[i];
+      bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
+      bin.regen_A2 += in.signed_A[i] * in.speed[i] < 0 ? share * a2 : 0;
+      for (int s = 0; s < thermal::boundary_count; ++s) bin.boundary_degC[s] += share * in.boundary[s][i];
+      from = to;
+    }
+  }
+  for (std::size_t b = 0; b < out.bins.size(); ++b) {
+    Bin& bin = out.bins[b];
+    bin.housing_degC = bin.core_degC = missing;
+    const double scale = covered[b] > 0 ? 1 / covered[b] : 0;
+    for (double& d : bin.drive) d *= scale;
+    for (double& d : bin.boundary_degC) d *= scale;
+    for (double* d : {&bin.signed_A, &bin.speed08, &bin.speed_signed, &bin.stalled_A2, &bin.regen_A2}) *d *= scale;
+  }
+  add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
+  add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
+  out.has_housing = log.has(Role::housing);
+  out.has_core = log.has(Role::core);
+  out.housing_noise_K = reading_noise(log.of(Role::housing));
+  out.core_noise_K = reading_noise(log.of(Role::core));
+
+  double most_heat = 0, most_speed = 0;
+  for (const Bin& bin : out.bins) {
+    most_heat = std::max({most_heat, bin.drive[static_cast<int>(Drive::current_A2)], std::abs(bin.drive[static_cast<int>(Drive::power_W)])});
+    most_speed = std::max(most_speed, bin.drive[static_cast<int>(Drive::speed_rad_per_s)]);
+  }
+  for (Bin& bin : out.bins) {
+    const double heat = std::max(bin.drive[static_cast<int>(Drive::current_A2)], std::abs(bin.drive[static_cast<int>(Drive::power_W)]));
+    // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
+    bin.idle = heat <= 1e-3 * most_heat && bin.drive[static_cast<int>(Drive::speed_rad_per_s)] <= 0.02 * most_speed + 1e-9;
+  }
+  return out;
+}
+
+}  // namespace identify

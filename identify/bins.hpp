@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// A log on an even grid of short bins, ready for the replay.
+//
+// Every nonlinear feature (i^2, |i||w|, w^0.8 ...) is formed from the raw samples and averaged afterwards: squaring an
+// averaged current costs 12..25 K of winding temperature under a gait's ripple. Inputs are held from one sample to the
+// next (zero-order hold), so that a bin that is as long as the sampling interval loses nothing.
+//
+// Current is the amplitude of the current vector: heat = 3/2 R_phase i^2. A current_A column is the direct current that
+// heats alike through two terminals, so i = 2/sqrt(3) times it (wire/motor.hpp).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "identify/log.hpp"
+#include "thermal/heat_set.hpp"
+
+namespace identify {
+
+struct Bin {
+  double drive[thermal::drive_count];        // mean of each drive over the bin
+  double boundary_degC[thermal::boundary_count];
+  double signed_A;                           // mean current with its sign
+  double speed08;                            // mean |w|^0.8
+  double speed_signed;                       // mean w
+  double stalled_A2;                         // mean i^2 while |w| is below 2 rad/s: about three seconds a turn
+  double regen_A2;                           // mean i^2 while current and speed have opposite signs
+  double housing_degC, core_degC;            // mean reading, NaN: none
+  float housing_at, core_at;                 // where in the bin, 0..1, its mean time lies
+  float housing_n, core_n;                   // readings in it
+  bool idle;                                 // nothing heats and nothing turns
+};
+
+struct Bins {
+  std::string name;
+  double width_s = 0;
+  std::vector<Bin> bins;
+  bool has_speed = false, has_power = false, has_ambient = false, has_frame = false, has_neighbour = false, has_core = false,
+       has_housing = false;
+  double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences
+  double missing_share = 0, gap_share = 0;
+  std::vector<std::string> notes;
+
+  double duration_s() const { return width_s * static_cast<double>(bins.size()); }
+};
+
+/// `finest_s`: bins no longer than this where the sampling allows it (a third of the winding's time constant).
+Bins bins_of(const Log& log, double finest_s);
+
+}  // namespace identify

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// Forward dual numbers: a value and its derivatives by N parameters, carried through every operation, so that a
+// simulation templated on its scalar yields exact sensitivities of the very code that it is. No heap.
+#pragma once
+
+#include <cmath>
+
+namespace identify {
+
+template <int N>
+struct Dual {
+  double v;
+  double d[N];
+
+  Dual() = default;
+  constexpr Dual(double value) : v(value), d{} {}  // implicit: a constant has no derivative
+  static Dual variable(double value, int direction) {
+    Dual x(value);
+    if (direction >= 0) x.d[direction] = 1;
+    return x;
+  }
+
+  Dual& operator+=(const Dual& b) {
+    v += b.v;
+    for (int i = 0; i < N; ++i) d[i] += b.d[i];
+    return *this;
+  }
+  Dual& operator-=(const Dual& b) {
+    v -= b.v;
+    for (int i = 0; i < N; ++i) d[i] -= b.d[i];
+    return *this;
+  }
+  Dual& operator+=(double b) { return v += b, *this; }
+  Dual& operator-=(double b) { return v -= b, *this; }
+  Dual& operator*=(double b) {
+    v *= b;
+    for (int i = 0; i < N; ++i) d[i] *= b;
+    return *this;
+  }
+  Dual& operator*=(const Dual& b) {
+    for (int i = 0; i < N; ++i) d[i] = d[i] * b.v + v * b.d[i];
+    v *= b.v;
+    return *this;
+  }
+  Dual& operator/=(const Dual& b) {
+    const double inverse = 1 / b.v;
+    v *= inverse;
+    for (int i = 0; i < N; ++i) d[i] = (d[i] - v * b.d[i]) * inverse;
+    return *this;
+  }
+
+  friend Dual operator+(Dual a, const Dual& b) { return a += b; }
+  friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
+  friend Dual operator*(Dual a, const Dual& b) { return a *= b; }
+  friend Dual operator/(Dual a, const Dual& b) { return a /= b; }
+  friend Dual operator+(Dual a, double b) { return a += b; }
+  friend Dual operator+(double a, Dual b) { return b += a; }
+  friend Dual operator-(Dual a, double b) { return a -= b; }
+  friend Dual operator-(double a, const Dual& b) { return -b += a; }
+  friend Dual operator*(Dual a, double b) { return a *= b; }
+  friend Dual operator*(double a, Dual b) { return b *= a; }
+  friend Dual operator/(Dual a, double b) { return a *= 1 / b; }
+  friend Dual operator/(double a, const Dual& b) { return Dual(a) /= b; }
+  friend Dual operator-(Dual a) {
+    a.v = -a.v;
+    for (int i = 0; i < N; ++i) a.d[i] = -a.d[i];
+    return a;
+  }
+  friend bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
+  friend bool operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
+  friend bool operator<=(const Dual& a, const Dual& b) { return a.v <= b.v; }
+  friend bool operator>=(const Dual& a, const Dual& b) { return a.v >= b.v; }
+  friend bool operator==(const Dual& a, const Dual& b) { return a.v == b.v; }
+
+  /// f(a) from its value and its slope at a.
+  static Dual chain(const Dual& a, double value, double slope) {
+    Dual r;
+    r.v = value;
+    for (int i = 0; i < N; ++i) r.d[i] = slope * a.d[i];
+    return r;
+  }
+  friend Dual exp(const Dual& a) {
+    const double e = std::exp(a.v);
+    return chain(a, e, e);
+  }
+  friend Dual log(const Dual& a) { return chain(a, std::log(a.v), 1 / a.v); }
+  friend Dual sqrt(const Dual& a) {
+    const double s = std::sqrt(a.v);
+    return chain(a, s, 0.5 / s);
+  }
+  friend Dual abs(const Dual& a) { return a.v < 0 ? -a : a; }
+  friend Dual fabs(const Dual& a) { return abs(a); }
+  friend Dual tanh(const Dual& a) {
+    const double t = std::tanh(a.v);
+    return chain(a, t, 1 - t * t);
+  }
+  friend Dual pow(const Dual& a, double k) { return chain(a, std::pow(a.v, k), k * std::pow(a.v, k - 1)); }
+  /// a^k for a > 0.
+  friend Dual pow(const Dual& a, const Dual& k) {
+    const double p = std::pow(a.v, k.v), by_a = p * k.v / a.v, by_k = p * std::log(a.v);
+    Dual r;
+    r.v = p;
+    for (int i = 0; i < N; ++i) r.d[i] = by_a * a.d[i] + by_k * k.d[i];
+    return r;
+  }
+  friend bool isfinite(const Dual& a) { return std::isfinite(a.v); }
+};
+
+inline double value(double x) { return x; }
+template <int N>
+double value(const Dual<N>& x) {
+  return x.v;
+}
+
+}  // namespace identify

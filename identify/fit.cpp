@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: MIT
+#include "identify/fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "identify/replay.hpp"
+
+namespace identify {
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double impossible = 1e300;
+constexpr double initial_sd_K = 3;   // the first readings tell the initial state this well, sensor offset included
+
+struct Coordinate {
+  double start, prior, sd, low, high;
+};
+
+double first_reading(const Bins& log, double Bin::*reading, int most = 5) {
+  double sum = 0;
+  int n = 0;
+  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < 30; ++k) {
+    if (!std::isnan(log.bins[k].*reading)) sum += log.bins[k].*reading, ++n;
+  }
+  return n > 0 ? sum / n : missing;
+}
+
+int coordinates_of(const std::vector<Chosen>& chosen) {
+  int n = 0;
+  for (const Chosen& c : chosen) n += static_cast<int>(causes()[static_cast<std::size_t>(c.cause)].parameters.size());
+  return n;
+}
+
+std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>& chosen) {
+  const Belief& b = problem.belief;
+  std::vector<Coordinate> out;
+  for (const double v : {b.R1_K_per_W, b.R2_K_per_W, b.C1_J_per_K, b.C2_J_per_K}) {
+    const double x = std::log(v);
+    out.push_back({x, x, b.log_sd, x - b.log_room, x + b.log_room});
+  }
+  for (const Chosen& c : chosen) {
+    for (const Parameter& p : causes()[static_cast<std::size_t>(c.cause)].parameters) {
+      if (p.logarithmic) {
+        const double centre = std::log(p.none != 0 ? p.none : p.typical);
+        out.push_back({centre, centre, p.typical, std::log(p.low), std::log(p.high)});
+      } else {
+        out.push_back({p.none, p.none, p.typical, p.low, p.high});
+      }
+    }
+  }
+  for (const Bins& log : problem.logs) {
+    const double housing = first_reading(log, &Bin::housing_degC), core = first_reading(log, &Bin::core_degC, 1);
+    const double at = std::isnan(housing) ? core : housing;
+    const double sink = log.bins.front().boundary_degC[0];
+    const double known = std::isnan(at) ? sink : at;
+    out.push_back({known, known, initial_sd_K, known - 60, known + 60});
+    const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
+    out.push_back({excess, excess, initial_sd_K + (std::isnan(core) ? 0 : problem.noise.core_white_K), -60, 150});
+  }
+  return out;
+}
+
+/// What simulates log `l` at coordinates x; local directions: base, causes, then the log's own two.
+template <class S>
+Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, int l) {
+  using std::exp;
+  const Belief& belief = problem.belief;
+  Model<S> m;
+  auto& set = m.set;
+  set.node_count = 2;
+  set.nodes[0] = {exp(x[2]), 155.0f};
+  set.nodes[1] = {exp(x[3]), 1e30f};
+  set.link_count = 2;
+  set.links[0] = {0, 1, thermal::LinkLaw::constant, exp(-x[0]), S(0)};
+  set.links[1] = {1, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, exp(-x[1]), S(0)};
+  set.source_count = 1;
+  if (problem.heated_by_power()) set.sources[0] = {0, thermal::Drive::power_W, S(1), S(0)};
+  else set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
+  set.housing = {1, S(0), S(0), S(0)};
+  int at = base_count;
+  for (const Chosen& c : chosen) {
+    const Cause& cause = causes()[static_cast<std::size_t>(c.cause)];
+    S k[4];
+    for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
+      const Parameter& parameter = cause.parameters[p];
+      const double scale = problem.scale(parameter.scale, cause.drive);
+      k[p] = (parameter.logarithmic ? exp(x[at]) : x[at]) * scale;
+    }
+    apply(cause, k, c, l, m);
+  }
+  return m;
+}
+
+/// The whitening filter of one channel: residual = white/sqrt(n) + slow, slow a first-order process. A scalar Kalman filter
+/// predicts the slow part; what is left over, divided by its standard deviation, is white.
+struct Whitener {
+  double keep, slow2, white2, P;
+  double gain = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
+
+  Whitener(double white_K, double slow_K, double slow_s, double step_s)
+      : keep(slow_s > 0 ? std::exp(-step_s / slow_s) : 0), slow2(slow_K * slow_K), white2(white_K * white_K), P(slow2) {}
+
+  void reading(double n) {
+    const double S = P + white2 / n + 1e-8;
+    gain = P / S;
+    weight = 1 / std::sqrt(S);
+    P *= 1 - gain;
+  }
+  void step() { P = keep * keep * P + (1 - keep * keep) * slow2; }
+};
+
+template <int N>
+struct Sums {
+  double H[N][N] = {};
+  double g[N] = {};
+  double misfit = 0;
+  int readings = 0;
+  double predicted[N + 1];
+};
+
+/// Adds one channel's reading to the sums.
+template <int N>
+void add(Sums<N>& sums, Whitener& w, double (&slow)[N + 1], const Dual<N>& simulated, double measured, double n) {
+  w.reading(n);
+  double e[N + 1];
+  e[N] = (simulated.v - measured - slow[N]) * w.weight;
+  for (int i = 0; i < N; ++i) e[i] = (simulated.d[i] - slow[i]) * w.weight;
+  const double back = w.gain / w.weight;
+  for (int i = 0; i <= N; ++i) slow[i] += back * e[i];
+  sums.misfit += 0.5 * e[N] * e[N];
+  ++sums.readings;
+  for (int i = 0; i < N; ++i) {
+    sums.g[i] += e[i] * e[N];
+    for (int j = 0; j <= i; ++j) sums.H[i][j] += e[i] * e[j];
+  }
+}
+
+struct Evaluation {
+  double misfit = 0;
+  int readings = 0;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd information;
+};
+
+template <int N>
+bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Evaluation& out) {
+  const int shared = base_count + coordinates_of(chosen);
+  const int all = static_cast<int>(x.size());
+  out.misfit = 0;
+  out.readings = 0;
+  out.gradient = Eigen::VectorXd::Zero(all);
+  out.information = Eigen::MatrixXd::Zero(all, all);
+  const Noise& noise = problem.noise;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Bins& log = problem.logs[l];
+    const int own = shared + per_log_count * static_cast<int>(l);
+    Dual<N> local[N];
+    for (int i = 0; i < shared; ++i) local[i] = Dual<N>::variable(x[i], i);
+    const auto housing0 = Dual<N>::variable(x[own], shared), excess = Dual<N>::variable(x[own + 1], shared + 1);
+    const auto model = build<Dual<N>>(problem, chosen, local, static_cast<int>(l));
+    Sums<N> sums;
+    Whitener housing(noise.housing_white_K, noise.housing_slow_K, noise.slow_s, log.width_s);
+    Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
+    double housing_slow[N + 1] = {}, core_slow[N + 1] = {};
+    bool finite = true;
+    replay(model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1, const Dual<N>*) {
+      const Bin& bin = log.bins[k];
+      if (bin.housing_n > 0) {
+        finite = finite && std::abs(y2.v) < 1e5;
+        add<N>(sums, housing, housing_slow, y2, bin.housing_degC, static_cast<double>(bin.housing_n));
+      }
+      if (bin.core_n > 0) {
+        finite = finite && std::abs(y1.v) < 1e5;
+        add<N>(sums, core, core_slow, y1, bin.core_degC, static_cast<double>(bin.core_n));
+      }
+      housing.step();
+      core.step();
+      for (int i = 0; i <= N; ++i) housing_slow[i] *= housing.keep;
+      if (core.slow2 > 0) {
+        for (int i = 0; i <= N; ++i) core_slow[i] *= core.keep;
+      }
+    });
+    if (!finite || !std::isfinite(sums.misfit)) return false;
+    out.misfit += sums.misfit;
+    out.readings += sums.readings;
+    const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
+    for (int i = 0; i < shared + per_log_count; ++i) {
+      out.gradient[place(i)] += sums.g[i];
+      for (int j = 0; j <= i; ++j) {
+        out.information(place(i), place(j)) += sums.H[i][j];
+        if (i != j) out.information(place(j), place(i)) += sums.H[i][j];
+      }
+    }
+  }
+  return true;
+}
+
+bool evaluate_any(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Evaluation& out) {
+  const int n = base_count + coordinates_of(chosen) + per_log_count;
+  if (n <= 6) return evaluate<6>(problem, chosen, x, out);
+  if (n <= 8) return evaluate<8>(problem, chosen, x, out);
+  if (n <= 10) return evaluate<10>(problem, chosen, x, out);
+  return evaluate<14>(problem, chosen, x, out);
+}
+
+double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
+  double sum = 0;
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    const double z = (x[static_cast<Eigen::Index>(i)] - c[i].prior) / c[i].sd;
+    sum += 0.5 * z * z;
+  }
+  return sum;
+}
+
+Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
+  const Eigen::Index n = x.size();
+  Fit out;
+  out.chosen = chosen;
+  Evaluation now, trial;
+  for (Eigen::Index i = 0; i < n; ++i) x[i] = std::clamp(x[i], c[static_cast<std::size_t>(i)].low, c[static_cast<std::size_t>(i)].high);
+  if (!evaluate_any(problem, chosen, x, now)) return out;
+  double cost = now.misfit + prior_cost(c, x), damping = 1e-3;
+  Eigen::VectorXd g(n);
+  Eigen::MatrixXd H(n, n);
+  std::vector<bool> held(static_cast<std::size_t>(n));
+  const auto linearise = [&] {
+    g = now.gradient;
+    H = now.information;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Coordinate& ci = c[static_cast<std::size_t>(i)];
+      g[i] += (x[i] - ci.prior) / (ci.sd * ci.sd);
+      H(i, i) += 1 / (ci.sd * ci.sd);
+      held[static_cast<std::size_t>(i)] = (x[i] <= ci.low && g[i] > 0) || (x[i] >= ci.high && g[i] < 0);
+    }
+  };
+  const auto step_with = [&](double lambda) -> Eigen::VectorXd {
+    Eigen::MatrixXd A = H;
+    Eigen::VectorXd b = -g;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      A(i, i) *= 1 + lambda;
+      if (!held[static_cast<std::size_t>(i)]) continue;
+      A.row(i).setZero();
+      A.col(i).setZero();
+      A(i, i) = 1;
+      b[i] = 0;
+    }
+    return A.ldlt().solve(b);
+  };
+  linearise();
+  for (int it = 0; it < most; ++it) {
+    out.iterations = it + 1;
+    // Newton decrement: what a full step still promises. Below 0.005 in log-likelihood no decision changes.
+    const Eigen::VectorXd newton = step_with(0);
+    if (-g.dot(newton) < 0.01) {
+      out.settled = true;
+      break;
+    }
+    bool better = false;
+    for (int attempt = 0; attempt < 9; ++attempt) {
+      const Eigen::VectorXd dx = attempt == 0 && damping <= 1e-3 ? newton : step_with(damping);
+      Eigen::VectorXd next = x;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const Coordinate& ci = c[static_cast<std::size_t>(i)];
+        next[i] = std::clamp(x[i] + std::clamp(dx[i], -2 * ci.sd, 2 * ci.sd), ci.low, ci.high);
+      }
+      if (evaluate_any(problem, chosen, next, trial)) {
+        const double next_cost = trial.misfit + prior_cost(c, next);
+        if (next_cost < cost) {
+          cost = next_cost;
+          x = next;
+          std::swap(now, trial);
+          damping = std::max(1e-9, damping * 0.2);
+          better = true;
+          break;
+        }
+      }
+      damping = std::min(1e9, std::max(damping, 1e-4) * 6);
+    }
+    if (!better) break;
+    linearise();
+  }
+  out.x = x;
+  out.gradient = g;
+  out.information = H;
+  out.from_data = now.information;
+  out.cost = cost;
+  out.misfit = now.misfit;
+  out.readings = now.readings;
+  out.at_bound = held;
+  return out;
+}
+
+}  // namespace
+
+int Fit::cause_coordinates() const { return coordinates_of(chosen); }
+
+double Fit::bic() const { return 2 * misfit + static_cast<double>(x.size()) * std::log(std::max(2, readings)); }
+
+Eigen::VectorXd Fit::std_errors() const {
+  Eigen::MatrixXd A = information;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    if (!at_bound[static_cast<std::size_t>(i)]) continue;
+    A.row(i).setZero();
+    A.col(i).setZero();
+    A(i, i) = 1e30;
+  }
+  const Eigen::MatrixXd covariance = A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
+  return covariance.diagonal().cwiseMax(0).cwiseSqrt();
+}
+
+Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* warm) {
+  const auto c = layout(problem, chosen);
+  const auto n = static_cast<Eigen::Index>(c.size());
+  Eigen::VectorXd x(n);
+  for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
+  const int own = coordinates_of(chosen);
+  int shared = 0;
+  if (warm != nullptr) {
+    shared = std::min(warm->cause_coordinates(), own);
+    x.head(base_count + shared) = warm->x.head(base_count + shared);
+    x.tail(n - base_count - own) = warm->x.tail(warm->x.size() - base_count - warm->cause_coordinates());
+  }
+  if (shared == own) return descend(problem, chosen, c, x, 60);
+
+  // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one valley.
+  const Cause& last = causes()[static_cast<std::size_t>(chosen.back().cause)];
+  const int first = base_count + own - static_cast<int>(last.parameters.size());
+  std::vector<std::vector<double>> starts;
+  if (last.edit == Edit::cooling_step) {
+    for (const double when : {0.15, 0.33, 0.5, 0.67, 0.85}) starts.push_back({0.1, when});
+  } else if (last.parameters.front().logarithmic && last.parameters.size() == 2) {
+    for (const double shift : {0.0, -2.0}) starts.push_back({c[static_cast<std::size_t>(first)].start + shift, c[static_cast<std::size_t>(first) + 1].start - shift / 2});
+  } else {
+    starts = {{c[static_cast<std::size_t>(first)].start + 0.1 * c[static_cast<std::size_t>(first)].sd}};
+  }
+  Fit best;
+  for (const auto& start : starts) {
+    for (std::size_t p = 0; p < start.size(); ++p) x[first + static_cast<Eigen::Index>(p)] = start[p];
+    Fit f = descend(problem, chosen, c, x, 40);
+    if (f.cost < best.cost) best = std::move(f);
+  }
+  return best;
+}
+
+Fit transferred(const Problem& other, const Fit& from) {
+  auto c = layout(other, from.chosen);
+  Eigen::VectorXd x(static_cast<Eigen::Index>(c.size()));
+  const Eigen::Index shared = base_count + from.cause_coordinates();
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    Coordinate& ci = c[static_cast<std::size_t>(i)];
+    if (i < shared) ci.start = ci.prior = ci.low = ci.high = from.x[i];
+    x[i] = ci.start;
+  }
+  return descend(other, from.chosen, c, x, 30);
+}
+
+Physical physical(const Problem&, const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
+
+double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate) {
+  const Parameter& parameter = cause.parameters[static_cast<std::size_t>(p)];
+  return (parameter.logarithmic ? std::exp(coordinate) : coordinate) * problem.scale(parameter.scale, cause.drive);
+}
+
+Model<double> model_of(const Problem& problem, const Fit& f, int log) { return build<double>(problem, f.chosen, f.x.data(), log); }
+
+Replayed replayed(const Problem& problem, const Fit& f, int l) {
+  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+  const Eigen::Index own = f.x.size() - per_log_count * static_cast<Eigen::Index>(problem.logs.size() - static_cast<std::size_t>(l));
+  const auto model = model_of(problem, f, l);
+  Replayed out;
+  Whitener white(problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.slow_s, log.width_s);
+  double slow = 0;
+  replay(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1, const double*) {
+    const Bin& bin = log.bins[k];
+    out.housing_degC.push_back(y2);
+    out.core_degC.push_back(y1);
+    out.housing_residual_K.push_back(bin.housing_degC - y2);
+    out.core_residual_K.push_back(bin.core_degC - y1);
+    double w = missing;
+    if (bin.housing_n > 0) {
+      white.reading(static_cast<double>(bin.housing_n));
+      w = (bin.housing_degC - y2 - slow) * white.weight;
+      slow += white.gain * w / white.weight;
+    }
+    out.whitened.push_back(w);
+    white.step();
+    slow *= white.keep;
+  });
+  return out;
+}
+
+Error error_of(const std::vector<double>& residual_K, std::size_t from, std::size_t to) {
+  double sum = 0, worst = 0;
+  int n = 0;
+  for (std::size_t k = from; k < std::min(to, residual_K.size()); ++k) {
+    if (std::isnan(residual_K[k])) continue;
+    sum += residual_K[k] * residual_K[k];
+    worst = std::max(worst, std::abs(residual_K[k]));
+    ++n;
+  }
+  return n > 0 ? Error{std::sqrt(sum / n), worst, n} : Error{missing, missing, 0};
+}
+
+double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+  Evaluation e;
+  if (!evaluate_any(problem, chosen, x, e)) return impossible;
+  if (gradient != nullptr) *gradient = e.gradient;
+  return e.misfit;
+}
+
+}  // namespace identify

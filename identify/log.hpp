@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// A measured log: what the columns of a table mean, in SI units and degrees Celsius.
+//
+//   in   a table; a map (file or --column) for foreign names and units
+//   out  one Log per session, time rising, every column either empty or as long as the time, NaN where missing
+//
+// Refuses what cannot be: a wrong unit, time that runs backwards, values no motor has. Knows nothing of models.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "identify/table.hpp"
+#include "wire/motor.hpp"
+
+namespace identify {
+
+enum class Role {
+  time, current, id, iq, power, speed, bus_V, bus_A, core, housing, ambient, coolant, frame, neighbour, board, winding_ohm, session,
+  count
+};
+inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
+
+/// The name under which a role is recognised without a map, unit included ("housing_degC").
+const std::string& own_name(Role role);
+
+struct Source {
+  std::string column;
+  double factor = 1, offset = 0;  // SI = factor * (cell + offset)
+};
+
+/// Which column plays which role, and how its unit becomes ours.
+struct ColumnMap {
+  std::map<Role, Source> columns;
+  std::string note;  // what a person should know of these logs, printed in the report
+};
+
+/// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and an optional note.
+ColumnMap read_map(const std::string& path);
+
+/// Adds "role=column" or "role=column:unit" (command line) to a map.
+void add_column(ColumnMap& map, const std::string& text);
+
+struct Log {
+  std::string name;
+  std::array<std::vector<double>, role_count> columns;
+  std::vector<std::string> notes;  // what was repaired, masked or assumed, one sentence each
+  int rows_frozen = 0, rows_missing = 0;
+  double missing_share = 0;        // of the housing (or core) readings and of the input, what had to be masked
+  double gap_share = 0;            // of the duration, what lies in gaps
+
+  const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
+  std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }
+  bool has(Role r) const { return !of(r).empty(); }
+};
+
+/// The logs in a table: one, or one a session. Throws UserError (unusable) in one sentence.
+std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor);
+
+}  // namespace identify

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// The program `identify`: a measured log in, what the simulation gets wrong out.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include "identify/discover.hpp"
+#include "wire/pc/files.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace {
+
+using identify::Log;
+using wire::pc::Exit;
+using wire::pc::UserError;
+
+constexpr const char* examples = R"(identify: what does the thermal simulation of this motor get wrong?
+
+Examples
+  identify walk.csv --motor ec-16-40w                     fit, judge, explain one log
+  identify run1.csv run3.csv --hold-out fan.csv           fit two logs, score on a third
+  identify bench.csv --map identify/maps/paderborn.toml --html report.html
+  identify bench.csv --column housing_degC=T_case:degF --json -
+)";
+
+struct Arguments {
+  std::vector<std::string> logs, columns;
+  std::string motor, map, hold_out, json, html, write_model;
+  bool explain = false;
+};
+
+std::vector<Log> read(const std::string& path, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
+  return identify::logs_of(identify::read_table(path), map, motor ? std::optional(motor->motor) : std::nullopt);
+}
+
+identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& paths, const identify::ColumnMap& map,
+                           const std::optional<wire::pc::MotorFile>& motor) {
+  identify::HoldOut out;
+  if (what.empty()) return out;
+  char* end = nullptr;
+  const double fraction = std::strtod(what.c_str(), &end);
+  if (*end == '\0') {
+    if (!(fraction > 0 && fraction < 0.9)) throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9.");
+    out.fraction = fraction;
+    return out;
+  }
+  std::erase(paths, what);
+  if (paths.empty()) throw UserError(Exit::usage, "--hold-out " + what + ": no log is left to fit; give another one.");
+  out.logs = read(what, map, motor);
+  return out;
+}
+
+int answer(Arguments a) {
+  std::optional<wire::pc::MotorFile> motor;
+  if (!a.motor.empty()) {
+    const char* folder = std::getenv("HOTCORE_MOTORS");
+    motor = wire::pc::read_motor(a.motor, folder != nullptr ? folder : HOTCORE_MOTOR_FOLDER);
+  }
+  identify::ColumnMap map;
+  if (!a.map.empty()) map = identify::read_map(a.map);
+  for (const std::string& column : a.columns) identify::add_column(map, column);
+  const identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
+  std::vector<Log> logs;
+  for (const std::string& path : a.logs) {
+    for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
+  }
+  identify::Report report = identify::discover(logs, motor, held);
+  if (!map.note.empty()) report.notes.push_back(map.note);
+  if (!a.write_model.empty()) {
+    wire::pc::write_whole(a.write_model, report.model_toml);
+    report.model_file = a.write_model;
+  }
+  if (!a.html.empty()) wire::pc::write_whole(a.html, as_html(report));
+  if (a.json == "-") {
+    fmt::print("{}", as_json(report));
+    return 0;
+  }
+  if (!a.json.empty()) wire::pc::write_whole(a.json, as_json(report));
+  fmt::print("{}", as_text(report, a.explain));
+  if (!a.html.empty()) fmt::print("\nReport with pictures: {}\n", a.html);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{examples};
+  Arguments a;
+  app.add_option("LOG", a.logs, "CSV logs of one motor")->required();
+  app.add_option("--motor", a.motor, "motor file (.toml), or the name of one in boards/motors; without it priors are wide");
+  app.add_option("--map", a.map, "TOML file that says which column is what");
+  app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")->allow_extra_args(false);
+  app.add_option("--hold-out", a.hold_out, "a log, or a fraction of each log, that is scored and not fitted");
+  app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
+  app.add_option("--html", a.html, "write a page with pictures");
+  app.add_option("--write-model", a.write_model, "write the model found as a heat-network parameter set");
+  app.add_flag("--explain", a.explain, "tell the chain of reasoning");
+  app.footer("Exit codes: 0 an answer was given, 2 usage, 3 the data cannot be used.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? 0 : static_cast<int>(Exit::usage);
+  }
+  try {
+    return answer(a);
+  } catch (const UserError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return error.exit_code();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "identify stopped: {}. This is a fault of the program; please report it with the log.\n", error.what());
+    return static_cast<int>(Exit::unusable);
+  }
+}

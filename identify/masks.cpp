@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#include "identify/masks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+namespace {
+
+using wire::pc::Exit;
+using wire::pc::UserError;
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+double median(std::vector<double> v) {
+  if (v.empty()) return missing;
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+std::size_t count_missing(const std::vector<double>& v) {
+  return static_cast<std::size_t>(std::count_if(v.begin(), v.end(), [](double x) { return std::isnan(x); }));
+}
+
+/// Share of readings that are missing from a channel which is otherwise sampled at every row. A channel written every
+/// n-th row (a sparse winding reading) is judged on its own grid.
+double holes(const std::vector<double>& v) {
+  std::vector<double> spacing;
+  std::size_t last = 0, seen = 0;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    if (seen++ != 0) spacing.push_back(static_cast<double>(i - last));
+    last = i;
+  }
+  if (seen < 2) return 1;
+  const double grid = median(spacing);
+  return std::max(0.0, 1.0 - static_cast<double>(seen) * grid / static_cast<double>(v.size()));
+}
+
+void report_frozen(Log& log, Role role, std::vector<double>& v) {
+  const auto runs = frozen_runs(v);
+  if (runs.empty()) return;
+  const auto& t = log.of(Role::time);
+  std::size_t rows = 0;
+  double longest_s = 0, from_s = 0;
+  for (const auto& [from, to] : runs) {
+    // The first reading of a run was measured; only its repetitions are not.
+    for (std::size_t i = from + 1; i < to; ++i) v[i] = missing;
+    rows += to - from - 1;
+    if (t[to - 1] - t[from] > longest_s) longest_s = t[to - 1] - t[from], from_s = t[from];
+  }
+  log.rows_frozen += static_cast<int>(rows);
+  log.notes.push_back(fmt::format("{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s); masked.",
+                                  own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
+}
+
+}  // namespace
+
+std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<double>& values) {
+  struct Run {
+    std::size_t from, to;
+  };
+  std::vector<Run> runs;
+  std::vector<double> lengths, steps;
+  double last = missing;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double x = values[i];
+    if (std::isnan(x)) continue;
+    if (!runs.empty() && x == last) {
+      runs.back().to = i + 1;
+      continue;
+    }
+    if (!runs.empty()) steps.push_back(std::abs(x - last));
+    runs.push_back({i, i + 1});
+    last = x;
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> frozen;
+  if (runs.size() < 10) return frozen;  // a typed constant, or a recording of nothing: no motion to compare with
+  for (const Run& run : runs) lengths.push_back(static_cast<double>(run.to - run.from));
+  std::vector<double> sorted = lengths;
+  std::sort(sorted.begin(), sorted.end());
+  const double usual = sorted[sorted.size() * 9 / 10];
+  const double step = median(steps);
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    if (lengths[r] < std::max(6.0, 8 * usual)) continue;
+    // A coarse channel rests at one step for long when nothing happens. It was frozen only if it then jumps by several.
+    const bool fine = usual <= 2;
+    const bool jumps = r + 1 < runs.size() && steps[r] > 4 * step;
+    if (fine || jumps) frozen.emplace_back(runs[r].from, runs[r].to);
+  }
+  return frozen;
+}
+
+void mask(Log& log) {
+  const auto& t = log.of(Role::time);
+  for (const Role role : {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
+    if (log.has(role)) report_frozen(log, role, log.of(role));
+  }
+
+  // Input: what heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
+  std::vector<Role> input = {Role::power};
+  if (!log.has(Role::power)) input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
+  for (const Role role : input) {
+    const double share = static_cast<double>(count_missing(log.of(role))) / static_cast<double>(t.size());
+    log.missing_share = std::max(log.missing_share, share);
+    if (share > 0.3) {
+      throw UserError(Exit::unusable, fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
+                                                  "again with every row filled.",
+                                                  log.name, own_name(role), 100 * share));
+    }
+    if (share > 0) log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.", own_name(role), 100 * share));
+  }
+  for (const Role role : {Role::housing, Role::core}) {
+    if (!log.has(role)) continue;
+    const double share = holes(log.of(role));
+    log.rows_missing += static_cast<int>(share * static_cast<double>(t.size()));
+    if (share > 0.02) log.notes.push_back(fmt::format("{} is missing in {:.0f} % of its readings; left out of the fit.", own_name(role), 100 * share));
+    if (role == Role::housing || !log.has(Role::housing)) log.missing_share = std::max(log.missing_share, share);
+  }
+
+  std::vector<double> spacing;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
+  const double usual = median(spacing);
+  double lost_s = 0;
+  int gaps = 0;
+  for (const double dt : spacing) {
+    // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are formed.
+    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) lost_s += dt - usual, ++gaps;
+  }
+  const double duration = t.back() - t.front();
+  log.gap_share = duration > 0 ? lost_s / duration : 0;
+  if (gaps > 0) {
+    log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.", gaps, gaps == 1 ? "" : "s",
+                                    lost_s, duration, gaps == 1 ? "it" : "them"));
+  }
+  const bool any = log.has(Role::housing) || log.has(Role::core);
+  if (!any) throw UserError(Exit::unusable, log.name + ": no temperature of the motor is left; record the housing or the winding.");
+}
+
+}  // namespace identify

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+#include "identify/problem.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identify/fit.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+namespace {
+
+using thermal::Drive;
+
+double drive(const Bin& bin, Drive d) { return bin.drive[static_cast<int>(d)]; }
+
+/// The slow part of the housing noise, from rest. Second differences over eight seconds cancel the cooling curve's slope;
+/// a first-order process of 20 s correlation keeps this much of its variance in them.
+void noise_from_rest(Problem& problem) {
+  constexpr double lag_s = 8, slow_s = 20;
+  const double rho = std::exp(-lag_s / slow_s), kept = 6 - 8 * rho + 2 * rho * rho;
+  double sum = 0, white = 0, rest_s = 0, reading2 = 0;
+  int n = 0, logs = 0;
+  for (const Bins& log : problem.logs) {
+    if (!log.has_housing) continue;
+    reading2 += log.housing_noise_K * log.housing_noise_K;
+    ++logs;
+    const auto j = static_cast<std::size_t>(std::max(1.0, std::round(lag_s / log.width_s)));
+    for (std::size_t k = j; k + j < log.bins.size(); ++k) {
+      bool rest = true;
+      for (std::size_t i = k - j; rest && i <= k + j; ++i) rest = log.bins[i].idle;
+      if (!rest) continue;
+      rest_s += log.width_s;
+      const Bin &a = log.bins[k - j], &b = log.bins[k], &c = log.bins[k + j];
+      if (std::isnan(a.housing_degC) || std::isnan(b.housing_degC) || std::isnan(c.housing_degC)) continue;
+      const double d = a.housing_degC - 2 * b.housing_degC + c.housing_degC;
+      sum += d * d;
+      white += log.housing_noise_K * log.housing_noise_K *
+               (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) + 1 / static_cast<double>(c.housing_n));
+      ++n;
+    }
+  }
+  Noise& noise = problem.noise;
+  // A perfectly repeating channel still has its last digit.
+  noise.housing_white_K = std::max(0.01, logs > 0 ? std::sqrt(reading2 / logs) : 0.2);
+  noise.slow_s = slow_s;
+  const double assumed2 = 0.05 * 0.05;  // a thermistor's slow wander where no rest tells
+  const double seen2 = n > 0 ? std::max(0.0, (sum - white) / (n * kept)) : assumed2;
+  const double trust = rest_s / (rest_s + 300);
+  noise.housing_slow_K = std::clamp(std::sqrt(trust * seen2 + (1 - trust) * assumed2), 0.02, 1.0);
+  noise.idle_s = rest_s;
+
+  // Winding: a dense channel shows its noise; readings further apart than the winding's own motion do not.
+  double core2 = 0;
+  int dense = 0, any = 0;
+  for (const Bins& log : problem.logs) {
+    if (!log.has_core) continue;
+    const auto readings = std::count_if(log.bins.begin(), log.bins.end(), [](const Bin& b) { return b.core_n > 0; });
+    ++any;
+    if (static_cast<std::size_t>(readings) * 2 < log.bins.size()) continue;
+    core2 += log.core_noise_K * log.core_noise_K;
+    ++dense;
+  }
+  if (any > 0 && dense == any) {
+    noise.core_white_K = std::max(0.02, std::sqrt(core2 / dense));
+    noise.core_slow_K = 2 * noise.housing_slow_K;  // a winding has no single temperature: a sensor on it wanders more
+  } else {
+    noise.core_white_K = 2;  // what resistance at standstill gives
+    noise.core_slow_K = 0;
+  }
+}
+
+void scales(Problem& problem) {
+  double n = 0, heat = 0, amps2 = 0, speed08 = 0;
+  problem.duration_s = 0;
+  for (double& m : problem.drive_mean) m = 0;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) {
+      for (int d = 0; d < thermal::drive_count; ++d) problem.drive_mean[d] += bin.drive[d];
+      heat += problem.heated_by_power() ? std::abs(drive(bin, Drive::power_W)) : problem.belief.ohm * drive(bin, Drive::current_A2);
+      amps2 += drive(bin, Drive::current_A2);
+      speed08 += bin.speed08;
+      n += 1;
+    }
+    problem.duration_s = std::max(problem.duration_s, log.duration_s());
+  }
+  for (double& m : problem.drive_mean) m /= n;
+  problem.heat_W = heat / n;
+  problem.rms_A = std::sqrt(amps2 / n);
+  problem.speed08_mean = speed08 / n;
+}
+
+/// Without a sheet: several guesses of the time constants, each fitted, the best one kept.
+void rough_search(Problem& problem) {
+  double rise_K = 1;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) {
+      const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+      if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.boundary_degC[0]);
+    }
+  }
+  Belief best;
+  double least = 1e300;
+  for (const double housing_s : {120.0, 600.0, 2400.0}) {
+    for (const double ratio : {0.1, 0.6}) {
+      Belief b = problem.belief;
+      b.log_sd = 2.3;  // a factor of ten either way
+      b.log_room = 9;
+      b.R2_K_per_W = rise_K / std::max(1e-9, problem.heat_W);
+      b.R1_K_per_W = ratio * b.R2_K_per_W;
+      b.C2_J_per_K = housing_s / b.R2_K_per_W;
+      b.C1_J_per_K = 0.02 * housing_s / b.R1_K_per_W;
+      problem.belief = b;
+      const Fit f = fit(problem, {});
+      if (f.cost >= least || f.x.size() == 0) continue;
+      least = f.cost;
+      best = b;
+      const Physical p = physical(problem, f.x);
+      best.R1_K_per_W = p.R1_K_per_W;
+      best.R2_K_per_W = p.R2_K_per_W;
+      best.C1_J_per_K = p.C1_J_per_K;
+      best.C2_J_per_K = p.C2_J_per_K;
+    }
+  }
+  if (least < 1e300) problem.belief = best;
+}
+
+}  // namespace
+
+bool Problem::any_core() const {
+  return std::any_of(logs.begin(), logs.end(), [](const Bins& b) { return b.has_core; });
+}
+
+double Problem::scale(Scale s, Drive d) const {
+  switch (s) {
+    case Scale::one: return 1;
+    case Scale::heat_per_drive: return drive_mean[static_cast<int>(d)] > 0 ? heat_W / drive_mean[static_cast<int>(d)] : 0;
+    case Scale::heat: return heat_W;
+    case Scale::sink_conductance: return 1 / belief.R2_K_per_W;
+    case Scale::core_capacity: return belief.C1_J_per_K;
+    case Scale::housing_capacity: return belief.C2_J_per_K;
+    case Scale::core_resistance: return belief.R1_K_per_W;
+    case Scale::sink_resistance: return belief.R2_K_per_W;
+    case Scale::rms_current: return rms_A;
+    case Scale::duration: return duration_s;
+    case Scale::speed08: return speed08_mean > 0 ? 1 / speed08_mean : 0;
+  }
+  return 1;
+}
+
+bool Problem::possible(const Cause& cause) const {
+  const auto any = [&](auto what) { return std::any_of(logs.begin(), logs.end(), what); };
+  const bool amps = rms_A > 0 && !heated_by_power();
+  switch (cause.needs) {
+    case Needs::nothing: return true;
+    case Needs::current: return amps;
+    case Needs::copper: return amps && belief.copper_per_K > 0;
+    case Needs::speed: {
+      const bool loaded = cause.drive == Drive::current_speed || cause.drive == Drive::current2_speed2 || cause.edit == Edit::stall_share;
+      return speed08_mean > 0 && (!loaded || amps);
+    }
+    case Needs::signed_current: {
+      const bool plus = any([](const Bins& b) { return std::any_of(b.bins.begin(), b.bins.end(), [](const Bin& x) { return x.signed_A > 0; }); });
+      return amps && plus;
+    }
+    case Needs::neighbour: return any([](const Bins& b) { return b.has_neighbour; });
+    case Needs::frame: return any([](const Bins& b) { return b.has_frame; });
+    case Needs::several_logs: return logs.size() > 1;
+  }
+  return true;
+}
+
+Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, std::optional<double> copper_per_K) {
+  Problem problem;
+  double finest_s = 1;
+  if (motor) {
+    const wire::Motor& m = motor->motor;
+    Belief& b = problem.belief;
+    b.known = true;
+    b.motor = motor->name;
+    b.ohm = 1.5 * m.phase_resistance_ohm;
+    b.copper_per_K = m.copper_coefficient_per_K;
+    b.R1_K_per_W = m.R1_K_per_W;
+    b.R2_K_per_W = m.R2_K_per_W;
+    b.C1_J_per_K = m.C1_J_per_K;
+    b.C2_J_per_K = m.C2_J_per_K;
+    b.winding_max_degC = m.winding_max_degC;
+    finest_s = m.R1_K_per_W * m.C1_J_per_K / 3;
+  }
+  if (copper_per_K) problem.belief.copper_per_K = *copper_per_K;
+  for (const Log& log : logs) problem.logs.push_back(bins_of(log, finest_s));
+  if (problem.heated_by_power()) problem.belief.copper_per_K = 0;
+  noise_from_rest(problem);
+  scales(problem);
+  if (!(problem.heat_W > 0)) {
+    throw wire::pc::UserError(wire::pc::Exit::unusable,
+                              fmt::format("{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
+                                          problem.logs.front().name));
+  }
+  if (!motor) rough_search(problem);
+  return problem;
+}
+
+}  // namespace identify

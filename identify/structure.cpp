@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#include "identify/structure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace identify {
+namespace {
+
+using thermal::Drive;
+
+struct Signal {
+  const char* name;
+  std::function<double(const Bin&)> of;
+};
+
+double d(const Bin& b, Drive drive) { return b.drive[static_cast<int>(drive)]; }
+
+std::vector<Signal> signals(const Problem& problem) {
+  std::vector<Signal> s;
+  if (problem.heated_by_power()) s.push_back({"power", [](const Bin& b) { return d(b, Drive::power_W); }});
+  else {
+    s.push_back({"current squared", [](const Bin& b) { return d(b, Drive::current_A2); }});
+    s.push_back({"size of the current", [](const Bin& b) { return d(b, Drive::current_A); }});
+    s.push_back({"sign of the current", [](const Bin& b) { return b.signed_A; }});
+  }
+  if (problem.speed08_mean > 0) {
+    s.push_back({"speed", [](const Bin& b) { return d(b, Drive::speed_rad_per_s); }});
+    s.push_back({"speed squared", [](const Bin& b) { return d(b, Drive::speed2_rad2_per_s2); }});
+  }
+  s.push_back({"sink temperature", [](const Bin& b) { return b.boundary_degC[0]; }});
+  if (problem.logs.front().has_neighbour) s.push_back({"neighbour's temperature", [](const Bin& b) { return b.boundary_degC[static_cast<int>(thermal::Boundary::neighbour)]; }});
+  if (problem.logs.front().has_frame) s.push_back({"frame temperature", [](const Bin& b) { return b.boundary_degC[static_cast<int>(thermal::Boundary::frame)]; }});
+  return s;
+}
+
+double correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::isnan(a[i]) || std::isnan(b[i])) continue;
+    n += 1, sa += a[i], sb += b[i], aa += a[i] * a[i], bb += b[i] * b[i], ab += a[i] * b[i];
+  }
+  if (n < 10) return 0;
+  const double va = aa - sa * sa / n, vb = bb - sb * sb / n;
+  return va > 1e-12 * aa && vb > 1e-12 * bb ? (ab - sa * sb / n) / std::sqrt(va * vb) : 0;
+}
+
+std::vector<double> smoothed(const std::vector<double>& v, double share) {
+  std::vector<double> out(v.size());
+  double state = v.empty() ? 0 : v.front();
+  for (std::size_t i = 0; i < v.size(); ++i) out[i] = state += share * (v[i] - state);
+  return out;
+}
+
+/// Upper tail of a chi-squared variable, by Wilson and Hilferty's cube root.
+double chi2_tail(double x, double k) {
+  const double z = (std::cbrt(x / k) - (1 - 2 / (9 * k))) / std::sqrt(2 / (9 * k));
+  return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
+
+double kolmogorov_tail(double x) {
+  double p = 0;
+  for (int j = 1; j <= 20; ++j) p += (j % 2 == 1 ? 2 : -2) * std::exp(-2.0 * j * j * x * x);
+  return std::clamp(p, 0.0, 1.0);
+}
+
+void find_wrong(const Problem& problem, int l, const char* channel, const std::vector<double>& residual, double noise_K,
+                const std::vector<Signal>& all, std::vector<Wrong>& out) {
+  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+  const std::size_t n = residual.size();
+  // Running means over 1/60 of the log but at least half a minute: finer detail is noise to the eye.
+  const auto half = static_cast<std::size_t>(std::max(15.0, log.duration_s() / 120) / log.width_s) + 1;
+  std::vector<double> sum(n + 1, 0), count(n + 1, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    sum[i + 1] = sum[i] + (std::isnan(residual[i]) ? 0 : residual[i]);
+    count[i + 1] = count[i] + (std::isnan(residual[i]) ? 0 : 1);
+  }
+  const auto mean = [&](std::size_t from, std::size_t to) { return count[to] > count[from] ? (sum[to] - sum[from]) / (count[to] - count[from]) : 0; };
+  int sign = 0;
+  std::size_t start = 0;
+  for (std::size_t i = 0; i <= n; ++i) {
+    const double m = i < n ? mean(i > half ? i - half : 0, std::min(n, i + half)) : 0;
+    const int now = m > noise_K ? 1 : m < -noise_K ? -1 : 0;
+    if (now == sign) continue;
+    if (sign != 0) {
+      Wrong w{l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s, mean(start, i), ""};
+      // What is unusual in this stretch: the signal whose mean lies furthest from its mean in the rest of the log.
+      double most = 0.3;
+      for (const Signal& s : all) {
+        double in = 0, out_ = 0, square = 0;
+        for (std::size_t k = 0; k < n; ++k) {
+          const double v = s.of(log.bins[k]);
+          (k >= start && k < i ? in : out_) += v;
+          square += v * v;
+        }
+        const double inside = static_cast<double>(i - start), outside = static_cast<double>(n) - inside, N = static_cast<double>(n);
+        if (outside < 1 || inside < 1) continue;
+        const double sd = std::sqrt(std::max(1e-12, square / N - std::pow((in + out_) / N, 2)));
+        const double z = (in / inside - out_ / outside) / sd;
+        if (std::abs(z) > most) most = std::abs(z), w.goes_with = std::string(z > 0 ? "high " : "low ") + s.name;
+      }
+      if (w.goes_with.empty()) w.goes_with = start < n / 10 ? "the start" : i > n * 9 / 10 ? "the end" : "none of the signals";
+      out.push_back(w);
+    }
+    sign = now;
+    start = i;
+  }
+}
+
+}  // namespace
+
+Whiteness whiteness(const std::vector<double>& whitened) {
+  std::vector<double> v;
+  for (const double w : whitened) {
+    if (!std::isnan(w)) v.push_back(w);
+  }
+  Whiteness out;
+  if (v.size() < 20) return out;
+  double square = 0, mean = 0;
+  for (const double w : v) square += w * w, mean += w;
+  out.ratio = std::sqrt(square / static_cast<double>(v.size()));
+  mean /= static_cast<double>(v.size());
+
+  const auto n = v.size();
+  double zero = 0, q = 0;
+  for (const double w : v) zero += (w - mean) * (w - mean);
+  const std::size_t lags = std::min<std::size_t>(40, n / 5);
+  for (std::size_t j = 1; j <= lags; ++j) {
+    double r = 0;
+    for (std::size_t i = j; i < n; ++i) r += (v[i] - mean) * (v[i - j] - mean);
+    r /= zero;
+    q += r * r / static_cast<double>(n - j);
+  }
+  out.ljung_box_p = chi2_tail(q * static_cast<double>(n) * static_cast<double>(n + 2), static_cast<double>(lags));
+
+  // Cumulated periodogram. Model errors are slow, so neighbouring values are averaged to 1024 at most.
+  const std::size_t group = (n + 1023) / 1024, m = n / group, half = (m - 1) / 2;
+  std::vector<double> g(m, 0.0), power;
+  for (std::size_t i = 0; i < m * group; ++i) g[i / group] += v[i] - mean;
+  double total = 0;
+  for (std::size_t f = 1; f <= half; ++f) {
+    const double w = 2 * 3.14159265358979323846 * static_cast<double>(f) / static_cast<double>(m), turn = 2 * std::cos(w);
+    double s1 = 0, s2 = 0;
+    for (const double x : g) {
+      const double s = x + turn * s1 - s2;
+      s2 = s1;
+      s1 = s;
+    }
+    power.push_back(s1 * s1 + s2 * s2 - turn * s1 * s2);
+    total += power.back();
+  }
+  double sum = 0, most = 0;
+  for (std::size_t f = 0; f < half; ++f) {
+    sum += power[f];
+    most = std::max(most, std::abs(sum / total - static_cast<double>(f + 1) / static_cast<double>(half)));
+  }
+  out.white_p = kolmogorov_tail(most * std::sqrt(static_cast<double>(half)));
+  return out;
+}
+
+Structure structure(const Problem& problem, const Fit& f) {
+  Structure out;
+  const auto all = signals(problem);
+  std::vector<double> whitened, residual, core_residual;
+  std::vector<std::vector<double>> plain(all.size()), fast(all.size()), slow(all.size());
+  std::vector<double> rise;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Bins& log = problem.logs[l];
+    const Replayed r = replayed(problem, f, static_cast<int>(l));
+    whitened.insert(whitened.end(), r.whitened.begin(), r.whitened.end());
+    const auto& seen = log.has_housing ? r.housing_residual_K : r.core_residual_K;
+    residual.insert(residual.end(), seen.begin(), seen.end());
+    for (std::size_t k = 0; k < log.bins.size(); ++k) rise.push_back(r.housing_degC[k] - log.bins[k].boundary_degC[0]);
+    for (std::size_t s = 0; s < all.size(); ++s) {
+      std::vector<double> v;
+      for (const Bin& b : log.bins) v.push_back(all[s].of(b));
+      const auto append = [](std::vector<double>& to, const std::vector<double>& from) { to.insert(to.end(), from.begin(), from.end()); };
+      append(plain[s], v);
+      append(fast[s], smoothed(v, log.width_s / (30 + log.width_s)));
+      append(slow[s], smoothed(v, log.width_s / (300 + log.width_s)));
+    }
+    const double threshold = std::max(0.1, 3 * problem.noise.housing_slow_K);
+    if (log.has_housing) find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, threshold, all, out.wrong);
+    if (log.has_core) find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K, std::max(3 * threshold, 0.7 * problem.noise.core_white_K), all, out.wrong);
+  }
+  if (!problem.logs.front().has_housing) {
+    whitened.clear();
+    for (const double r : residual) whitened.push_back(r / problem.noise.core_white_K);
+  }
+  out.housing = whiteness(whitened);
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    Relation best{all[s].name, 0, 0};
+    for (const auto& [values, tau] : {std::pair(&plain[s], 0.0), std::pair(&fast[s], 30.0), std::pair(&slow[s], 300.0)}) {
+      const double c = correlation(residual, *values);
+      if (std::abs(c) > std::abs(best.correlation)) best = {all[s].name, c, tau};
+    }
+    out.relations.push_back(best);
+  }
+  out.relations.push_back({"housing above sink", correlation(residual, rise), 0});
+  std::sort(out.relations.begin(), out.relations.end(), [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+  std::sort(out.wrong.begin(), out.wrong.end(), [](const Wrong& a, const Wrong& b) {
+    return std::abs(a.mean_K) * (a.to_s - a.from_s) > std::abs(b.mean_K) * (b.to_s - b.from_s);
+  });
+  if (out.wrong.size() > 8) out.wrong.resize(8);
+  return out;
+}
+
+std::vector<Loose> directions(const Fit& f) {
+  const Eigen::Index rest = f.x.size() - base_count;
+  Eigen::MatrixXd F = f.from_data.topLeftCorner(base_count, base_count);
+  if (rest > 0) {
+    Eigen::MatrixXd D = f.from_data.bottomRightCorner(rest, rest);
+    D.diagonal().array() += 1e-9;
+    F -= f.from_data.topRightCorner(base_count, rest) * D.ldlt().solve(f.from_data.bottomLeftCorner(rest, base_count));
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(F);
+  std::vector<Loose> out;
+  for (int i = 0; i < base_count; ++i) {
+    Loose loose{};
+    loose.sd = 1 / std::sqrt(std::max(1e-12, solver.eigenvalues()[i]));
+    for (int j = 0; j < base_count; ++j) loose.share[j] = solver.eigenvectors()(j, i);
+    out.push_back(loose);
+  }
+  return out;
+}
+
+double sd_from_data(const Fit& f, int coordinate) {
+  double variance = 0;
+  for (const Loose& direction : directions(f)) variance += std::pow(direction.sd * direction.share[coordinate], 2);
+  return std::sqrt(variance);
+}
+
+}  // namespace identify

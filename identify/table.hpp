@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
+//
+//   in   a file: comma, semicolon or tab; quotes; CRLF; byte-order mark; '#' lines before the header; decimal comma
+//        when the separator is a semicolon
+//   out  names and columns of numbers, NaN where a cell is empty or says nan
+//
+// Does not know what the columns mean (roles.hpp does).
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace identify {
+
+struct Table {
+  std::string file;
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> columns;  // columns[c][row]
+  std::vector<int> line;                     // line number of each row, for sentences
+
+  std::size_t rows() const { return line.size(); }
+  int find(const std::string& name) const;   // -1: no such column
+};
+
+/// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when there is no such file.
+Table read_table(const std::string& path);
+
+}  // namespace identify

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// Units that loggers write, and how each becomes SI (temperatures: degrees Celsius). The one door for conversions.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace identify {
+
+struct Unit {
+  std::string quantity;  // "time", "current", "temperature", ...
+  double factor, offset; // SI = factor * (value + offset)
+};
+
+std::optional<Unit> unit_named(const std::string& unit);
+
+/// Quantity of one of our own unit suffixes ("A", "degC", "rad_per_s"); empty when it is none.
+std::string quantity_of(const std::string& suffix);
+
+/// Sets factor and offset for a column in `unit` that plays `role` (an own name, unit included). Throws UserError
+/// (usage), saying `where`, when the unit is unknown or measures something else.
+void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor, double& offset);
+
+}  // namespace identify

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "identify/log.hpp"
+#include "identify/masks.hpp"
+#include "wire/pc/motor_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace {
+
+using identify::ColumnMap;
+using identify::Log;
+using identify::Role;
+using wire::pc::UserError;
+
+std::string file(const std::string& text) {
+  const std::string path = (std::filesystem::temp_directory_path() /
+                            (std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv")).string();
+  std::ofstream(path, std::ios::binary) << text;
+  return path;
+}
+
+std::vector<Log> read(const std::string& text, const ColumnMap& map = {}) { return identify::logs_of(identify::read_table(file(text)), map, std::nullopt); }
+
+std::string complaint(const std::string& text, const ColumnMap& map = {}, int code = 3) {
+  try {
+    read(text, map);
+  } catch (const UserError& error) {
+    EXPECT_EQ(error.exit_code(), code);
+    const std::string sentence = error.what();
+    EXPECT_EQ(sentence.find('\n'), std::string::npos);
+    return sentence;
+  }
+  ADD_FAILURE() << "read without a complaint";
+  return "";
+}
+
+bool says(const std::string& sentence, const std::string& part) {
+  if (sentence.find(part) != std::string::npos) return true;
+  ADD_FAILURE() << "'" << sentence << "' does not say '" << part << "'";
+  return false;
+}
+
+const std::string head = "time_s,current_A,housing_degC\n";
+
+TEST(Reader, OwnColumnNamesNeedNoMap) {
+  const auto logs = read(head + "0,1,20\n0.1,2,21\n");
+  ASSERT_EQ(logs.size(), 1u);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[1], 2);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21);
+}
+
+TEST(Reader, SemicolonsDecimalCommasQuotesCrlfAndByteOrderMarkAreUnderstood) {
+  const auto logs = read("\xEF\xBB\xBF# logger 3\r\n\"time_s\";\"current_A\";housing_degC\r\n0;1,5;20,25\r\n0,5;-2;\"21,5\"\r\n");
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[0], 1.5);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21.5);
+}
+
+TEST(Reader, TabsAreUnderstood) {
+  EXPECT_DOUBLE_EQ(read("time_s\tcurrent_A\thousing_degC\n0\t1\t20\n1\t2\t21\n")[0].of(Role::housing)[1], 21);
+}
+
+TEST(Reader, UnitsOfMappedColumnsBecomeSi) {
+  ColumnMap map;
+  identify::add_column(map, "time_s=ms:ms");
+  identify::add_column(map, "speed_rad_per_s=n:rpm");
+  identify::add_column(map, "housing_degC=TF:degF");
+  identify::add_column(map, "current_A=I:mA");
+  const Log log = read("ms,n,TF,I\n0,60,68,1000\n500,60,212,2000\n", map)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 0.5);
+  EXPECT_NEAR(log.of(Role::speed)[0], 6.283185307, 1e-9);
+  EXPECT_NEAR(log.of(Role::housing)[0], 20, 1e-9);
+  EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+}
+
+TEST(Reader, EmptyCellsAreMissingValues) {
+  const Log log = read("time_s,current_A,housing_degC,core_degC\n0,1,20,25\n1,1,,\n2,1,NaN,\n3,1,21,\n")[0];
+  EXPECT_TRUE(std::isnan(log.of(Role::housing)[1]));
+  EXPECT_TRUE(std::isnan(log.of(Role::housing)[2]));
+  EXPECT_DOUBLE_EQ(log.of(Role::core)[0], 25);
+}
+
+TEST(Reader, SessionsBecomeLogsOfTheirOwn) {
+  const auto logs = read("session,time_s,current_A,housing_degC\n1,0,1,20\n1,1,1,20\n2,0,1,30\n2,1,2,31\n");
+  ASSERT_EQ(logs.size(), 2u);
+  EXPECT_DOUBLE_EQ(logs[1].of(Role::housing)[1], 31);
+}
+
+TEST(Reader, ATornFileIsRefusedWithItsLine) {
+  says(complaint(head + "0,1,20\n1,1,2"), "so");
+  says(complaint(head + "0,1,20\n1,1"), "line 3: the row has 2 of 3 cells and the file ends in it, so it was cut off");
+}
+
+TEST(Reader, ARowOfTheWrongLengthIsRefusedWithItsLine) { says(complaint(head + "0,1,20\n1,1,20,7\n2,1,20\n"), "line 3: the row has 4 of 3 cells"); }
+TEST(Reader, TextInANumberColumnIsRefusedWithLineAndColumn) {
+  says(complaint(head + "0,1,20\n1,oops,20\n"), "line 3: 'oops' in column 'current_A' is not a number");
+}
+TEST(Reader, AnEmptyFileIsRefused) { says(complaint(""), "the file is empty"); }
+TEST(Reader, AHeaderAloneIsRefused) { says(complaint(head), "no row"); }
+TEST(Reader, NumbersInsteadOfAHeaderAreRefused) { says(complaint("0,1,20\n1,1,20\n"), "where the header should be"); }
+TEST(Reader, ALineOfTenMegabytesIsRefused) { says(complaint(head + std::string(10'000'000, '7') + "\n"), "10.0 MB without a line end"); }
+TEST(Reader, BinaryIsRefused) { says(complaint(head + std::string("0,1,\0", 5) + "\n"), "not a text file"); }
+TEST(Reader, AMissingColumnIsNamedWithWhatThereIs) {
+  says(complaint("time_s,current_A\n0,1\n1,1\n"), "a measured temperature (housing_degC or core_degC) is missing");
+  says(complaint("t,current_A,housing_degC\n0,1,20\n"), "time column is missing");
+  says(complaint("time_s,housing_degC\n0,20\n"), "heat input");
+}
+TEST(Reader, AMappedColumnThatIsNotThereIsNamedWithTheNearest) {
+  ColumnMap map;
+  identify::add_column(map, "housing_degC=T_bodi");
+  says(complaint("time_s,current_A,T_body\n0,1,20\n", map), "did you mean 'T_body'?");
+}
+TEST(Reader, TimeThatRunsBackwardsIsRefusedWithItsLine) {
+  says(complaint(head + "0,1,20\n1,1,20\n0.5,1,20\n2,1,20\n"), "line 4: time runs backwards from 1 to 0.5 s");
+}
+TEST(Reader, AHeaderInAnotherUnitIsRefusedWithTheConversion) {
+  says(complaint("time_s,current_mA,housing_degC\n0,1,20\n"), "--column current_A=current_mA:mA");
+  says(complaint("time_s,current_A,housing_degF\n0,1,20\n"), "--column housing_degC=housing_degF:degF");
+  says(complaint("time_s,current_A,housing_degC,speed_rpm\n0,1,20,3\n"), "--column speed_rad_per_s=speed_rpm:rpm");
+}
+TEST(Reader, KelvinIsRecognised) { says(complaint(head + "0,1,293\n1,1,294\n"), "looks like kelvin"); }
+TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
+  says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,70,70\n1,1,71,70\n"), "looks like Fahrenheit");
+}
+TEST(Reader, MilliampereIsRecognised) { says(complaint(head + "0,1500,20\n1,-2500,20\n"), "if it is in mA"); }
+TEST(Reader, ImpossibleTemperaturesAreRefused) { says(complaint(head + "0,1,20\n1,1,9999\n"), "housing_degC reaches 9999"); }
+TEST(Reader, RowsWithoutTimeAreRefusedWhenMany) { says(complaint(head + "0,1,20\n,1,20\n,1,20\n"), "2 of 3 rows have no time"); }
+TEST(Reader, AnInputThatIsMostlyMissingIsRefused) { says(complaint(head + "0,1,20\n1,,20\n2,,20\n3,1,20\n"), "current_A is missing in 50 % of the rows"); }
+TEST(Reader, AColumnOfNothingCountsAsMissing) { says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature"); }
+TEST(Reader, AFileThatIsNotThereIsAUsageError) {
+  try {
+    identify::read_table("no/such/log.csv");
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    says(error.what(), "there is no such file");
+  }
+}
+
+TEST(Map, AMisspeltRoleIsAnsweredWithTheNearest) {
+  ColumnMap map;
+  try {
+    identify::add_column(map, "housing_C=T");
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    says(error.what(), "did you mean 'housing_degC'?");
+  }
+}
+TEST(Map, AUnitOfAnotherQuantityIsRefused) {
+  ColumnMap map;
+  EXPECT_THROW(identify::add_column(map, "speed_rad_per_s=n:degF"), UserError);
+  EXPECT_THROW(identify::add_column(map, "speed_rad_per_s=n:furlong"), UserError);
+}
+TEST(Map, TheMapsThatComeAlongAreRead) {
+  for (const auto& entry : std::filesystem::directory_iterator(HOTCORE_SOURCE_DIR "/identify/maps")) {
+    EXPECT_NO_THROW(identify::read_map(entry.path().string())) << entry.path();
+  }
+}
+
+TEST(Masks, AFrozenStretchOfAMovingChannelIsFound) {
+  std::vector<double> v;
+  for (int i = 0; i < 400; ++i) v.push_back(20 + 0.013 * i + 0.1 * ((i * 7919) % 13));
+  for (int i = 150; i < 190; ++i) v[static_cast<std::size_t>(i)] = v[150];
+  const auto runs = identify::frozen_runs(v);
+  ASSERT_EQ(runs.size(), 1u);
+  EXPECT_EQ(runs[0].first, 150u);
+  EXPECT_EQ(runs[0].second, 190u);
+}
+TEST(Masks, ACoarseOrConstantChannelIsNotFrozen) {
+  EXPECT_TRUE(identify::frozen_runs(std::vector<double>(500, 25.0)).empty());
+  std::vector<double> coarse;
+  for (int i = 0; i < 2000; ++i) coarse.push_back(20 + 0.5 * std::floor(10 * (1 - std::exp(-i / 300.0)) / 0.5));
+  EXPECT_TRUE(identify::frozen_runs(coarse).empty());
+}
+TEST(Masks, GapsInTimeAreCounted) {
+  std::string text = head;
+  for (int i = 0; i < 100; ++i) text += std::to_string(i < 50 ? i : i + 40) + ",1," + std::to_string(20 + i % 7) + "\n";
+  const Log log = read(text)[0];
+  EXPECT_NEAR(log.gap_share, 40.0 / 139, 0.01);
+  ASSERT_FALSE(log.notes.empty());
+  says(log.notes.back(), "1 gap in time");
+}
+
+}  // namespace
