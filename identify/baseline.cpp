@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 namespace identify {
@@ -34,29 +35,6 @@ std::string in_words(const Loose& loose) {
                       : fmt::format("{} is known only to a factor of {:.1f}", product, std::exp(loose.sd));
 }
 
-void add_plots(const Problem& problem, const Fit& f, Report& report) {
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Bins& log = problem.logs[l];
-    const Replayed r = replayed(problem, f, static_cast<int>(l));
-    LogPlot plot;
-    plot.name = log.name;
-    plot.heat_label = problem.heated_by_power() ? "power, W" : "current, A";
-    for (std::size_t k = 0; k < log.bins.size(); ++k) {
-      const Bin& b = log.bins[k];
-      plot.time_s.push_back((static_cast<double>(k) + 0.5) * log.width_s);
-      plot.heat.push_back(problem.heated_by_power() ? b.drive[static_cast<int>(thermal::Drive::power_W)]
-                                                    : std::sqrt(b.drive[static_cast<int>(thermal::Drive::current_A2)]));
-      plot.measured_housing.push_back(b.housing_degC);
-      plot.measured_core.push_back(b.core_degC);
-    }
-    plot.simulated_housing = r.housing_degC;
-    plot.simulated_core = r.core_degC;
-    plot.residual_housing = r.housing_residual_K;
-    plot.residual_core = r.core_residual_K;
-    report.plots.push_back(std::move(plot));
-  }
-}
-
 }  // namespace
 
 Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
@@ -70,6 +48,29 @@ Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
     core = joined(core, c);
   }
   return {housing.rms_K, core.rms_K, housing.worst_K, core.worst_K};
+}
+
+void add_plots(const Problem& problem, const Fit& f, const std::string& remark, Report& report) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Bins& log = problem.logs[l];
+    const Replayed r = replayed(problem, f, static_cast<int>(l));
+    LogPlot plot;
+    plot.name = std::filesystem::path(log.name).filename().string() + remark;
+    plot.heat_label = problem.heated_by_power() ? "power, W" : "current, A";
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      const Bin& b = log.bins[k];
+      plot.time_s.push_back((static_cast<double>(k) + 0.5) * log.width_s);
+      plot.heat.push_back(problem.heated_by_power() ? b.input[thermal::Drive::power_W]
+                                                    : std::sqrt(b.input[thermal::Drive::current_A2]));
+      plot.measured_housing.push_back(b.housing_degC);
+      plot.measured_core.push_back(b.core_degC);
+    }
+    plot.simulated_housing = r.housing_degC;
+    plot.simulated_core = r.core_degC;
+    plot.residual_housing = r.housing_residual_K;
+    plot.residual_core = r.core_residual_K;
+    report.plots.push_back(std::move(plot));
+  }
 }
 
 Problem first_part(const Problem& problem, double fraction) {
@@ -97,7 +98,8 @@ std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& f, doub
   std::vector<ParameterLine> out;
   const Eigen::VectorXd sd = f.std_errors();
   for (int i = 0; i < base_count; ++i) {
-    ParameterLine line{base_names[i], base_units[i], std::exp(f.x[i]), 0, false, f.at_bound[static_cast<std::size_t>(i)]};
+    ParameterLine line{
+        base_names[i], base_units[i], std::exp(f.x[i]), 0, false, f.at_bound[static_cast<std::size_t>(i)]};
     const double of_log = sd[i] * inflation;
     line.std_error = line.value * std::min(of_log, 10.0);
     line.determined = sd_from_data(f, i) * inflation < determined_sd && of_log < determined_sd;
@@ -113,31 +115,40 @@ std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& f, doub
 std::string core_refusal(const Problem& problem, const Fit& f) {
   if (problem.any_core()) return "";
   if (problem.belief.copper_per_K == 0) {
-    return "The winding temperature cannot be found from the housing alone when the heat does not depend on the winding: the housing fixes only R2, "
-           "R1 C1 + R2 (C1 + C2) and R1 C1 R2 C2, three numbers for four unknowns. No winding temperature is stated; record core_degC or winding_ohm now "
+    return "The winding temperature cannot be found from the housing alone when the heat does not depend on the "
+           "winding: the housing fixes only R2, "
+           "R1 C1 + R2 (C1 + C2) and R1 C1 R2 C2, three numbers for four unknowns. No winding temperature is stated; "
+           "record core_degC or winding_ohm now "
            "and then.";
   }
   const double sd = sd_from_data(f, 0);
   if (sd < 1) return "";
-  return fmt::format("This log does not determine R1 (known to a factor of {:.0f}): no winding temperature is stated; record core_degC or winding_ohm "
-                     "now and then, or load the motor until it is hot.",
-                     std::exp(std::min(sd, 6.0)));
+  return fmt::format(
+      "This log does not determine R1 (known to a factor of {:.0f}): no winding temperature is stated; record "
+      "core_degC or winding_ohm "
+      "now and then, or load the motor until it is hot.",
+      std::exp(std::min(sd, 6.0)));
 }
 
-Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, Report& report) {
+Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
+                   const std::optional<wire::pc::MotorFile>& motor, Report& report) {
   const auto start = std::chrono::steady_clock::now();
   const Fit f = fit(problem, {});
   report.fit_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   report.iterations = f.iterations;
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";
   for (const Bins& log : problem.logs) {
-    for (const std::string& note : log.notes) report.notes.push_back(problem.logs.size() > 1 ? log.name + ": " + note : note);
+    for (const std::string& note : log.notes)
+      report.notes.push_back(problem.logs.size() > 1 ? log.name + ": " + note : note);
   }
   if (!problem.belief.known) {
-    report.notes.push_back(problem.heated_by_power()
-                               ? "No motor file was given: the starting values come from the data, and priors are a factor of ten wide."
-                               : "No motor file was given: the winding's resistance is taken as 1 ohm (3/2 of a phase's) and its coefficient as copper's; "
-                                 "R1 and R2 then come out times the true resistance, C1 and C2 divided by it. Priors are a factor of ten wide.");
+    report.notes.push_back(
+        problem.heated_by_power()
+            ? "No motor file was given: the starting values come from the data, and priors are a factor of ten wide."
+            : "No motor file was given: the winding's resistance is taken as 1 ohm (3/2 of a phase's) and its "
+              "coefficient as copper's; "
+              "R1 and R2 then come out times the true resistance, C1 and C2 divided by it. Priors are a factor of ten "
+              "wide.");
   }
   report.structure = structure(problem, f);
   report.baseline_rmse = rmse_of(problem, f);
@@ -155,19 +166,22 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs, const s
   }
   const bool residual = report.structure.housing.ratio < 1.3;
   report.converged = f.settled && residual && identifiable;
-  report.checks = {
-      fmt::format("gradient: {} after {} iterations", f.settled ? "at rest" : "NOT at rest", f.iterations),
-      fmt::format("residual: {:.2f} times the noise{}", report.structure.housing.ratio, residual ? "" : ", so the model is not right yet"),
-      identifiable ? "identifiability: all four parameters are determined by this data"
-                   : fmt::format("identifiability: {} of 4 directions are not determined by this data", report.loose.size())};
+  report.checks = {fmt::format("gradient: {} after {} iterations", f.settled ? "at rest" : "NOT at rest", f.iterations),
+                   fmt::format("residual: {:.2f} times the noise{}", report.structure.housing.ratio,
+                               residual ? "" : ", so the model is not right yet"),
+                   identifiable ? "identifiability: all four parameters are determined by this data"
+                                : fmt::format("identifiability: {} of 4 directions are not determined by this data",
+                                              report.loose.size())};
 
   // Is copper's coefficient a gain at all? Where it is not, two errors cancel, and neither is small.
   if (!problem.heated_by_power() && problem.belief.copper_per_K > 0) {
-    report.variants.push_back({fmt::format("resistance grows with temperature ({:.5f} per K)", problem.belief.copper_per_K), report.baseline_rmse});
+    report.variants.push_back(
+        {fmt::format("resistance grows with temperature ({:.5f} per K)", problem.belief.copper_per_K),
+         report.baseline_rmse});
     Problem constant = problem_of(logs, motor, 0.0);
     report.variants.push_back({"resistance constant", rmse_of(constant, fit(constant, {}))});
   }
-  add_plots(problem, f, report);
+  add_plots(problem, f, "", report);
   return f;
 }
 

@@ -8,18 +8,22 @@ namespace identify {
 
 /// Part of a problem that the fit may not see.
 struct HoldOut {
-  std::vector<Log> logs;     // whole logs, or none
-  double fraction = 0;       // last part of each log, 0: none
+  std::vector<Log> logs;  // whole logs, or none
+  double fraction = 0;    // last part of each log, 0: none
 };
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots).
-Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, Report& report);
+Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
+                   const std::optional<wire::pc::MotorFile>& motor, Report& report);
 
 Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
 
 /// A problem whose readings after (1 - fraction) of each log are masked, and the opposite (only those are kept).
 Problem first_part(const Problem& problem, double fraction);
 Problem last_part(const Problem& problem, double fraction);
+
+/// Appends what was measured and what this fit simulates, log by log.
+void add_plots(const Problem& problem, const Fit& fit, const std::string& remark, Report& report);
 
 /// Parameter lines of base and causes.
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);

@@ -19,7 +19,7 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double stalled_rad_per_s = 2;
 constexpr std::size_t most_bins = 200000;
 
-double& at(Bin& bin, Drive d) { return bin.drive[static_cast<int>(d)]; }
+double& at(Bin& bin, Drive d) { return bin.input[d]; }
 
 /// Missing cells replaced by the line between their neighbours.
 std::vector<double> bridged(std::vector<double> v, const std::vector<double>& t) {
@@ -53,16 +53,13 @@ double reading_noise(const std::vector<double>& v) {
   for (const double x : v) {
     if (!std::isnan(x)) seen.push_back(x);
   }
-  double sum = 0;
   for (std::size_t i = 2; i < seen.size(); ++i) second.push_back(std::abs(seen[i] - 2 * seen[i - 1] + seen[i - 2]));
-  const double middle = median(second);
-  for (const double d : second) sum += std::min(d, 5 * middle) * std::min(d, 5 * middle);
-  // A coarse channel repeats itself: the median is then zero and the mean square of the differences must do.
-  if (middle <= 0) {
-    for (const double d : second) sum += d * d;
-    return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));
-  }
-  return middle / (0.6745 * std::sqrt(6.0));
+  // Steps of the load are outliers here: clipped at five standard deviations, as the median tells them. A coarse
+  // channel repeats itself; its median is zero and nothing is clipped.
+  const double middle = median(second), most = middle > 0 ? 5 * middle / 0.6745 : 1e300;
+  double sum = 0;
+  for (const double d : second) sum += std::min(d, most) * std::min(d, most);
+  return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));
 }
 
 struct Inputs {
@@ -100,10 +97,12 @@ Inputs inputs_of(const Log& log, Bins& out) {
     const auto& y = log.of(log.has(Role::housing) ? Role::housing : Role::core);
     const auto first = std::find_if(y.begin(), y.end(), [](double x) { return !std::isnan(x); });
     sink.assign(t.size(), *first);
-    out.notes.push_back(fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
+    out.notes.push_back(
+        fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
   }
   for (auto& b : in.boundary) b = sink;
-  if (log.has(Role::frame)) in.boundary[static_cast<int>(Boundary::frame)] = bridged(log.of(Role::frame), t), out.has_frame = true;
+  if (log.has(Role::frame))
+    in.boundary[static_cast<int>(Boundary::frame)] = bridged(log.of(Role::frame), t), out.has_frame = true;
   if (log.has(Role::neighbour)) {
     in.boundary[static_cast<int>(Boundary::neighbour)] = bridged(log.of(Role::neighbour), t);
     out.has_neighbour = true;
@@ -145,8 +144,9 @@ Bins bins_of(const Log& log, double finest_s) {
   const double usual_s = median(spacing);
   const double duration_s = t.back();
   if (!(usual_s > 0) || t.size() < 30) {
-    throw wire::pc::UserError(wire::pc::Exit::unusable, fmt::format("{}: {} rows over {:.1f} s are too few to fit a motor; record some minutes.",
-                                                                    log.name, t.size(), duration_s));
+    throw wire::pc::UserError(wire::pc::Exit::unusable,
+                              fmt::format("{}: {} rows over {:.1f} s are too few to fit a motor; record some minutes.",
+                                          log.name, t.size(), duration_s));
   }
   out.width_s = std::max({usual_s, std::min(2.0, finest_s), duration_s / static_cast<double>(most_bins)});
   // A whole number of samples a bin, so that all bins hold equally many.
@@ -176,11 +176,9 @@ Bins bins_of(const Log& log, double finest_s) {
       at(bin, Drive::enabled) += share * (a > 0 || w > 0 ? 1 : 0);
       at(bin, Drive::power_W) += share * in.power_W[i];
       bin.signed_A += share * in.signed_A[i];
-      bin.speed08 += share * w08;
-      bin.speed_signed += share * in.speed[i];
+      at(bin, Drive::speed_to_0_8) += share * w08;
       bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
-      bin.regen_A2 += in.signed_A[i] * in.speed[i] < 0 ? share * a2 : 0;
-      for (int s = 0; s < thermal::boundary_count; ++s) bin.boundary_degC[s] += share * in.boundary[s][i];
+      for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary[s][i];
       from = to;
     }
   }
@@ -188,9 +186,10 @@ Bins bins_of(const Log& log, double finest_s) {
     Bin& bin = out.bins[b];
     bin.housing_degC = bin.core_degC = missing;
     const double scale = covered[b] > 0 ? 1 / covered[b] : 0;
-    for (double& d : bin.drive) d *= scale;
-    for (double& d : bin.boundary_degC) d *= scale;
-    for (double* d : {&bin.signed_A, &bin.speed08, &bin.speed_signed, &bin.stalled_A2, &bin.regen_A2}) *d *= scale;
+    for (double& d : bin.input.drive) d *= scale;
+    for (double& d : bin.input.boundary_degC) d *= scale;
+    bin.signed_A *= scale;
+    bin.stalled_A2 *= scale;
   }
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
@@ -201,13 +200,16 @@ Bins bins_of(const Log& log, double finest_s) {
 
   double most_heat = 0, most_speed = 0;
   for (const Bin& bin : out.bins) {
-    most_heat = std::max({most_heat, bin.drive[static_cast<int>(Drive::current_A2)], std::abs(bin.drive[static_cast<int>(Drive::power_W)])});
-    most_speed = std::max(most_speed, bin.drive[static_cast<int>(Drive::speed_rad_per_s)]);
+    most_heat = std::max({most_heat, bin.input.drive[static_cast<int>(Drive::current_A2)],
+                          std::abs(bin.input.drive[static_cast<int>(Drive::power_W)])});
+    most_speed = std::max(most_speed, bin.input.drive[static_cast<int>(Drive::speed_rad_per_s)]);
   }
   for (Bin& bin : out.bins) {
-    const double heat = std::max(bin.drive[static_cast<int>(Drive::current_A2)], std::abs(bin.drive[static_cast<int>(Drive::power_W)]));
+    const double heat = std::max(bin.input.drive[static_cast<int>(Drive::current_A2)],
+                                 std::abs(bin.input.drive[static_cast<int>(Drive::power_W)]));
     // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
-    bin.idle = heat <= 1e-3 * most_heat && bin.drive[static_cast<int>(Drive::speed_rad_per_s)] <= 0.02 * most_speed + 1e-9;
+    bin.idle = heat <= 1e-3 * most_heat &&
+               bin.input.drive[static_cast<int>(Drive::speed_rad_per_s)] <= 0.02 * most_speed + 1e-9;
   }
   return out;
 }

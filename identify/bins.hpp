@@ -18,25 +18,21 @@
 namespace identify {
 
 struct Bin {
-  double drive[thermal::drive_count];        // mean of each drive over the bin
-  double boundary_degC[thermal::boundary_count];
-  double signed_A;                           // mean current with its sign
-  double speed08;                            // mean |w|^0.8
-  double speed_signed;                       // mean w
-  double stalled_A2;                         // mean i^2 while |w| is below 2 rad/s: about three seconds a turn
-  double regen_A2;                           // mean i^2 while current and speed have opposite signs
-  double housing_degC, core_degC;            // mean reading, NaN: none
-  float housing_at, core_at;                 // where in the bin, 0..1, its mean time lies
-  float housing_n, core_n;                   // readings in it
-  bool idle;                                 // nothing heats and nothing turns
+  thermal::HeatInput<double> input;  // means over the bin
+  double signed_A;                   // mean current with its sign
+  double stalled_A2;                 // mean i^2 while |w| is below 2 rad/s: about three seconds a turn
+  double housing_degC, core_degC;    // mean reading, NaN: none
+  float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
+  float housing_n, core_n;           // readings in it
+  bool idle;                         // nothing heats and nothing turns
 };
 
 struct Bins {
   std::string name;
   double width_s = 0;
   std::vector<Bin> bins;
-  bool has_speed = false, has_power = false, has_ambient = false, has_frame = false, has_neighbour = false, has_core = false,
-       has_housing = false;
+  bool has_speed = false, has_power = false, has_ambient = false, has_frame = false, has_neighbour = false,
+       has_core = false, has_housing = false;
   double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences
   double missing_share = 0, gap_share = 0;
   std::vector<std::string> notes;
@@ -44,7 +40,7 @@ struct Bins {
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 
-/// `finest_s`: bins no longer than this where the sampling allows it (a third of the winding's time constant).
+/// `finest_s`: bins no longer than this where the sampling allows it (half the winding's time constant).
 Bins bins_of(const Log& log, double finest_s);
 
 }  // namespace identify

@@ -12,17 +12,23 @@
 namespace identify {
 
 enum class Edit {
-  source,            // heat into a node, parameter 0 W per unit of the drive
-  coefficient,       // parameter 0: temperature coefficient of the copper loss
-  sink_law,          // parameter 0: k of the law of the link housing-sink
-  contact_law,       // parameter 0: k of the link core-housing
-  radiation,         // parameter 0: conductance of a radiating link housing-sink, W/K at 300 K
-  link,              // parameter 0: conductance housing-boundary
-  mass,              // parameters: capacity and resistance of a further node on the housing
-  hot_spot,          // the same on the winding, taking a share of its loss
-  cooling_step,      // parameters: factor of the sink conductance, and when
-  cooling_of_log,    // parameter 0: factor of the sink conductance throughout one of several logs
-  current_offset, sensor_lag, sensor_offset, sensor_gain, drift, delay, stall_share
+  source,          // heat into a node, parameter 0 W per unit of the drive
+  coefficient,     // parameter 0: temperature coefficient of the copper loss
+  sink_law,        // parameter 0: k of the law of the link housing-sink
+  contact_law,     // parameter 0: k of the link core-housing
+  radiation,       // parameter 0: conductance of a radiating link housing-sink, W/K at 300 K
+  link,            // parameter 0: conductance housing-boundary
+  mass,            // parameters: capacity and resistance of a further node on the housing
+  hot_spot,        // the same on the winding, taking a share of its loss
+  cooling_step,    // parameters: factor of the sink conductance, and when
+  cooling_of_log,  // parameter 0: factor of the sink conductance throughout one of several logs
+  current_offset,
+  sensor_lag,
+  sensor_offset,
+  sensor_gain,
+  drift,
+  delay,
+  stall_share
 };
 
 /// What a parameter is measured by, so that one bound suits a 5 W motor and a 50 kW one.
@@ -31,28 +37,33 @@ enum class Scale {
   heat_per_drive,    // mean copper heat / mean drive: 1 = as much heat as the copper makes
   heat,              // mean copper heat
   sink_conductance,  // 1/R2
-  core_capacity, housing_capacity, core_resistance, sink_resistance,
-  rms_current, duration, speed08
+  core_capacity,
+  housing_capacity,
+  core_resistance,
+  sink_resistance,
+  rms_current,
+  duration,
+  speed08
 };
 
 struct Parameter {
   const char* name;
   const char* unit;
   Scale scale;
-  double low, high;   // in units of the scale
-  double typical;     // prior standard deviation about none (about `typical` itself, in logarithm, where `logarithmic`)
+  double low, high;  // in units of the scale
+  double typical;    // prior standard deviation about none (about `typical` itself, in logarithm, where `logarithmic`)
   bool logarithmic = false;
-  double none = 0;    // the value at which the cause does nothing
+  double none = 0;  // the value at which the cause does nothing
 };
 
 enum class Needs { nothing, current, speed, neighbour, frame, signed_current, several_logs, copper };
 
 struct Cause {
   const char* id;
-  const char* name;       // in words, with the members of the class that temperatures cannot tell apart
+  const char* name;  // in words, with the members of the class that temperatures cannot tell apart
   Edit edit;
   thermal::Drive drive;
-  int node;               // 0 winding, 1 housing
+  int node;  // 0 winding, 1 housing
   thermal::LinkLaw law;
   thermal::Boundary boundary;
   Needs needs;
@@ -80,7 +91,8 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
   auto& set = model.set;
   const auto ambient = set.links[model.sink_link].to;
   const auto add_link = [&](int from, int to, thermal::LinkLaw law, const S& conductance) {
-    set.links[set.link_count++] = {static_cast<std::int8_t>(from), static_cast<std::int8_t>(to), law, conductance, S(0)};
+    set.links[set.link_count++] = {static_cast<std::int8_t>(from), static_cast<std::int8_t>(to), law, conductance,
+                                   S(0)};
   };
   const auto add_node = [&](const S& capacity) {
     set.nodes[set.node_count] = {capacity, 1e30f};
@@ -90,7 +102,9 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
     case Edit::source:
       set.sources[set.source_count++] = {static_cast<std::int8_t>(cause.node), cause.drive, k[0], S(0)};
       break;
-    case Edit::coefficient: set.sources[0].coefficient_per_K = k[0]; break;
+    case Edit::coefficient:
+      set.sources[0].coefficient_per_K = k[0];
+      break;
     case Edit::sink_law:
       set.links[model.sink_link].law = cause.law;
       set.links[model.sink_link].k = k[0];
@@ -99,8 +113,12 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       set.links[0].law = cause.law;
       set.links[0].k = k[0];
       break;
-    case Edit::radiation: add_link(model.housing, ambient, thermal::LinkLaw::radiation, k[0]); break;
-    case Edit::link: add_link(model.housing, thermal::boundary_end(cause.boundary), thermal::LinkLaw::constant, k[0]); break;
+    case Edit::radiation:
+      add_link(model.housing, ambient, thermal::LinkLaw::radiation, k[0]);
+      break;
+    case Edit::link:
+      add_link(model.housing, thermal::boundary_end(cause.boundary), thermal::LinkLaw::constant, k[0]);
+      break;
     case Edit::mass: {
       const int node = add_node(k[0]);
       add_link(model.housing, node, thermal::LinkLaw::constant, 1.0 / k[1]);
@@ -125,15 +143,22 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       model.cooling_changes = true;
       break;
     case Edit::cooling_of_log:
-      if (chosen.log == log) set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
+      if (chosen.log == log)
+        set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
       break;
     case Edit::current_offset:
       model.current_offset_A = k[0];
       model.offset = true;
       break;
-    case Edit::sensor_lag: set.housing.lag_s = k[0] + 0.02; break;  // a lag of zero has no slope to fit by
-    case Edit::sensor_offset: set.housing.offset_K = k[0]; break;
-    case Edit::sensor_gain: set.housing.gain_error = k[0]; break;
+    case Edit::sensor_lag:
+      set.housing.lag_s = k[0] + 0.02;
+      break;  // a lag of zero has no slope to fit by
+    case Edit::sensor_offset:
+      set.housing.offset_K = k[0];
+      break;
+    case Edit::sensor_gain:
+      set.housing.gain_error = k[0];
+      break;
     case Edit::drift:
       model.drift_K_per_s = k[0];
       model.drifts = true;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Map files (identify/maps/*.toml) and the units they may name.
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <filesystem>
 #include <map>
-#include <toml++/toml.h>
 #include <vector>
 
 #include "identify/log.hpp"
@@ -22,15 +22,33 @@ constexpr double pi = 3.14159265358979323846;
 
 const std::map<std::string, Unit>& units() {
   static const std::map<std::string, Unit> table = {
-      {"s", {"time", 1, 0}},           {"ms", {"time", 1e-3, 0}},          {"us", {"time", 1e-6, 0}},
-      {"min", {"time", 60, 0}},        {"h", {"time", 3600, 0}},           {"A", {"current", 1, 0}},
-      {"mA", {"current", 1e-3, 0}},    {"kA", {"current", 1e3, 0}},        {"W", {"power", 1, 0}},
-      {"mW", {"power", 1e-3, 0}},      {"kW", {"power", 1e3, 0}},          {"V", {"voltage", 1, 0}},
-      {"mV", {"voltage", 1e-3, 0}},    {"degC", {"temperature", 1, 0}},    {"C", {"temperature", 1, 0}},
-      {"K", {"temperature", 1, -273.15}}, {"degF", {"temperature", 5.0 / 9.0, -32}}, {"F", {"temperature", 5.0 / 9.0, -32}},
-      {"rad_per_s", {"speed", 1, 0}},  {"rad/s", {"speed", 1, 0}},         {"rpm", {"speed", pi / 30, 0}},
-      {"deg/s", {"speed", pi / 180, 0}}, {"deg_per_s", {"speed", pi / 180, 0}}, {"Hz", {"speed", 2 * pi, 0}},
-      {"ohm", {"resistance", 1, 0}},   {"mohm", {"resistance", 1e-3, 0}},  {"1", {"number", 1, 0}},
+      {"s", {"time", 1, 0}},
+      {"ms", {"time", 1e-3, 0}},
+      {"us", {"time", 1e-6, 0}},
+      {"min", {"time", 60, 0}},
+      {"h", {"time", 3600, 0}},
+      {"A", {"current", 1, 0}},
+      {"mA", {"current", 1e-3, 0}},
+      {"kA", {"current", 1e3, 0}},
+      {"W", {"power", 1, 0}},
+      {"mW", {"power", 1e-3, 0}},
+      {"kW", {"power", 1e3, 0}},
+      {"V", {"voltage", 1, 0}},
+      {"mV", {"voltage", 1e-3, 0}},
+      {"degC", {"temperature", 1, 0}},
+      {"C", {"temperature", 1, 0}},
+      {"K", {"temperature", 1, -273.15}},
+      {"degF", {"temperature", 5.0 / 9.0, -32}},
+      {"F", {"temperature", 5.0 / 9.0, -32}},
+      {"rad_per_s", {"speed", 1, 0}},
+      {"rad/s", {"speed", 1, 0}},
+      {"rpm", {"speed", pi / 30, 0}},
+      {"deg/s", {"speed", pi / 180, 0}},
+      {"deg_per_s", {"speed", pi / 180, 0}},
+      {"Hz", {"speed", 2 * pi, 0}},
+      {"ohm", {"resistance", 1, 0}},
+      {"mohm", {"resistance", 1e-3, 0}},
+      {"1", {"number", 1, 0}},
   };
   return table;
 }
@@ -47,7 +65,8 @@ std::string quantity_of(const std::string& suffix) {
   return unit ? unit->quantity : std::string();
 }
 
-void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor, double& offset) {
+void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor,
+                double& offset) {
   const auto known = unit_named(unit);
   if (!known) {
     std::vector<std::string> names;
@@ -59,7 +78,8 @@ void apply_unit(const std::string& unit, const std::string& role, const std::str
     wanted = quantity_of(role.substr(cut + 1));
   }
   if (!wanted.empty() && wanted != known->quantity) {
-    throw UserError(Exit::usage, fmt::format("{}: {} is a {}, but {} is a {}; map another column.", where, unit, known->quantity, role, wanted));
+    throw UserError(Exit::usage, fmt::format("{}: {} is a {}, but {} is a {}; map another column.", where, unit,
+                                             known->quantity, role, wanted));
   }
   factor = known->factor;
   offset = known->offset;
@@ -73,18 +93,20 @@ ColumnMap read_map(const std::string& path) {
   try {
     file = toml::parse_file(path);
   } catch (const toml::parse_error& error) {
-    throw UserError(Exit::usage, fmt::format("{}, line {}: {}; repair the map.", path, error.source().begin.line, error.description()));
+    throw UserError(Exit::usage, fmt::format("{}, line {}: {}; repair the map.", path, error.source().begin.line,
+                                             error.description()));
   }
   for (const auto& [key, unused] : file) {
     if (key.str() != "columns" && key.str() != "note") {
-      throw UserError(Exit::usage, fmt::format("{}: unknown key '{}'{}; a map holds [columns] and note.", path, key.str(),
-                                               wire::pc::did_you_mean(key.str(), {"columns", "note"})));
+      throw UserError(Exit::usage, fmt::format("{}: unknown key '{}'{}; a map holds [columns] and note.", path,
+                                               key.str(), wire::pc::did_you_mean(key.str(), {"columns", "note"})));
     }
   }
   ColumnMap map;
   map.note = file["note"].value_or(std::string());
   const toml::table* columns = file["columns"].as_table();
-  if (columns == nullptr) throw UserError(Exit::usage, path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");
+  if (columns == nullptr)
+    throw UserError(Exit::usage, path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");
   for (const auto& [role, value] : *columns) {
     const std::string name(role.str());
     std::string text;
@@ -92,13 +114,16 @@ ColumnMap read_map(const std::string& path) {
     if (const auto* table = value.as_table()) {
       for (const auto& [key, unused] : *table) {
         if (key.str() != "column" && key.str() != "unit") {
-          throw UserError(Exit::usage, fmt::format("{}: {}: unknown key '{}'; known are column and unit.", path, name, key.str()));
+          throw UserError(Exit::usage,
+                          fmt::format("{}: {}: unknown key '{}'; known are column and unit.", path, name, key.str()));
         }
       }
       text = (*table)["column"].value_or(std::string());
       if (const auto unit = (*table)["unit"].value<std::string>()) text += ":" + *unit;
     }
-    if (text.empty()) throw UserError(Exit::usage, fmt::format("{}: {}: write \"column\" or {{ column = \"...\", unit = \"rpm\" }}.", path, name));
+    if (text.empty())
+      throw UserError(Exit::usage,
+                      fmt::format("{}: {}: write \"column\" or {{ column = \"...\", unit = \"rpm\" }}.", path, name));
     try {
       add_column(map, name + "=" + text);
     } catch (const UserError& error) {

@@ -8,7 +8,8 @@
 namespace identify {
 namespace {
 
-void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held, const Fit& f, Report& report) {
+void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                    const Fit& f, Report& report) {
   if (held.fraction > 0) {
     HeldOut out;
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
@@ -23,6 +24,7 @@ void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFil
     const Fit moved = transferred(other, f);
     out.before = rmse_of(other, moved, &out.each_before);
     for (const Log& log : held.logs) out.names.push_back(log.name);
+    add_plots(other, moved, " (not seen by the fit)", report);
     report.held_out = out;
   }
 }
@@ -39,11 +41,15 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   report.verdict = adequate ? "adequate" : "unknown_cause";
   const Rmse& e = report.baseline_rmse;
   const bool core = !std::isnan(e.core_K);
-  report.sentence = adequate ? fmt::format("The two-resistor model is adequate: it misses the {} by {:.2f} K rms, no more than the noise.", core ? "winding" : "housing",
-                                           core ? e.core_K : e.housing_K)
-                             : fmt::format("The two-resistor model is wrong: it misses the {} by {:.1f} K rms ({:.1f} K at worst), {:.1f} times what noise explains.",
-                                           core ? "winding" : "housing", core ? e.core_K : e.housing_K, core ? e.core_worst_K : e.housing_worst_K,
-                                           report.structure.housing.ratio);
+  report.sentence =
+      adequate
+          ? fmt::format("The two-resistor model is adequate: it misses the {} by {:.2f} K rms, no more than the noise.",
+                        core ? "winding" : "housing", core ? e.core_K : e.housing_K)
+          : fmt::format(
+                "The two-resistor model is wrong: it misses the {} by {:.1f} K rms ({:.1f} K at worst), {:.1f} times "
+                "what noise explains.",
+                core ? "winding" : "housing", core ? e.core_K : e.housing_K, core ? e.core_worst_K : e.housing_worst_K,
+                report.structure.housing.ratio);
   return report;
 }
 

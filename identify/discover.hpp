@@ -6,6 +6,7 @@
 
 namespace identify {
 
-Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& hold_out = {});
+Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
+                const HoldOut& hold_out = {});
 
 }  // namespace identify

@@ -3,6 +3,7 @@
 // simulation templated on its scalar yields exact sensitivities of the very code that it is. No heap.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 
 namespace identify {
@@ -106,10 +107,28 @@ struct Dual {
   friend bool isfinite(const Dual& a) { return std::isfinite(a.v); }
 };
 
-inline double value(double x) { return x; }
+inline double value_of(double x) { return x; }
 template <int N>
-double value(const Dual<N>& x) {
+double value_of(const Dual<N>& x) {
   return x.v;
 }
 
 }  // namespace identify
+
+/// What Eigen asks of a scalar.
+template <int N>
+struct Eigen::NumTraits<identify::Dual<N>> : Eigen::NumTraits<double> {
+  using Real = identify::Dual<N>;
+  using NonInteger = identify::Dual<N>;
+  using Nested = identify::Dual<N>;
+  using Literal = double;
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 1,
+    ReadCost = N + 1,
+    AddCost = N + 1,
+    MulCost = 2 * N + 1
+  };
+};

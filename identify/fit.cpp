@@ -12,7 +12,7 @@ namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double impossible = 1e300;
-constexpr double initial_sd_K = 3;   // the first readings tell the initial state this well, sensor offset included
+constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
 struct Coordinate {
   double start, prior, sd, low, high;
@@ -53,7 +53,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
   for (const Bins& log : problem.logs) {
     const double housing = first_reading(log, &Bin::housing_degC), core = first_reading(log, &Bin::core_degC, 1);
     const double at = std::isnan(housing) ? core : housing;
-    const double sink = log.bins.front().boundary_degC[0];
+    const double sink = log.bins.front().input.boundary_degC[0];
     const double known = std::isnan(at) ? sink : at;
     out.push_back({known, known, initial_sd_K, known - 60, known + 60});
     const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
@@ -76,8 +76,10 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   set.links[0] = {0, 1, thermal::LinkLaw::constant, exp(-x[0]), S(0)};
   set.links[1] = {1, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, exp(-x[1]), S(0)};
   set.source_count = 1;
-  if (problem.heated_by_power()) set.sources[0] = {0, thermal::Drive::power_W, S(1), S(0)};
-  else set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
+  if (problem.heated_by_power())
+    set.sources[0] = {0, thermal::Drive::power_W, S(1), S(0)};
+  else
+    set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
   set.housing = {1, S(0), S(0), S(0)};
   int at = base_count;
   for (const Chosen& c : chosen) {
@@ -93,14 +95,17 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   return m;
 }
 
-/// The whitening filter of one channel: residual = white/sqrt(n) + slow, slow a first-order process. A scalar Kalman filter
-/// predicts the slow part; what is left over, divided by its standard deviation, is white.
+/// The whitening filter of one channel: residual = white/sqrt(n) + slow, slow a first-order process. A scalar Kalman
+/// filter predicts the slow part; what is left over, divided by its standard deviation, is white.
 struct Whitener {
   double keep, slow2, white2, P;
   double gain = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
 
   Whitener(double white_K, double slow_K, double slow_s, double step_s)
-      : keep(slow_s > 0 ? std::exp(-step_s / slow_s) : 0), slow2(slow_K * slow_K), white2(white_K * white_K), P(slow2) {}
+      : keep(slow_s > 0 ? std::exp(-step_s / slow_s) : 0),
+        slow2(slow_K * slow_K),
+        white2(white_K * white_K),
+        P(slow2) {}
 
   void reading(double n) {
     const double S = P + white2 / n + 1e-8;
@@ -165,7 +170,7 @@ bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const E
     Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
     double housing_slow[N + 1] = {}, core_slow[N + 1] = {};
     bool finite = true;
-    replay(model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1, const Dual<N>*) {
+    replay(model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
       const Bin& bin = log.bins[k];
       if (bin.housing_n > 0) {
         finite = finite && std::abs(y2.v) < 1e5;
@@ -197,7 +202,8 @@ bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const E
   return true;
 }
 
-bool evaluate_any(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Evaluation& out) {
+bool evaluate_any(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
+                  Evaluation& out) {
   const int n = base_count + coordinates_of(chosen) + per_log_count;
   if (n <= 6) return evaluate<6>(problem, chosen, x, out);
   if (n <= 8) return evaluate<8>(problem, chosen, x, out);
@@ -214,12 +220,14 @@ double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
   return sum;
 }
 
-Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
+Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std::vector<Coordinate>& c,
+            Eigen::VectorXd x, int most) {
   const Eigen::Index n = x.size();
   Fit out;
   out.chosen = chosen;
   Evaluation now, trial;
-  for (Eigen::Index i = 0; i < n; ++i) x[i] = std::clamp(x[i], c[static_cast<std::size_t>(i)].low, c[static_cast<std::size_t>(i)].high);
+  for (Eigen::Index i = 0; i < n; ++i)
+    x[i] = std::clamp(x[i], c[static_cast<std::size_t>(i)].low, c[static_cast<std::size_t>(i)].high);
   if (!evaluate_any(problem, chosen, x, now)) return out;
   double cost = now.misfit + prior_cost(c, x), damping = 1e-3;
   Eigen::VectorXd g(n);
@@ -259,7 +267,7 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
     }
     bool better = false;
     for (int attempt = 0; attempt < 9; ++attempt) {
-      const Eigen::VectorXd dx = attempt == 0 && damping <= 1e-3 ? newton : step_with(damping);
+      const Eigen::VectorXd dx = damping < 1e-5 ? newton : step_with(damping);
       Eigen::VectorXd next = x;
       for (Eigen::Index i = 0; i < n; ++i) {
         const Coordinate& ci = c[static_cast<std::size_t>(i)];
@@ -268,15 +276,19 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
       if (evaluate_any(problem, chosen, next, trial)) {
         const double next_cost = trial.misfit + prior_cost(c, next);
         if (next_cost < cost) {
+          // A step that delivers little of what it promised overshot a curved valley: R1 C1 is known, R1 alone hardly.
+          const Eigen::VectorXd moved = next - x;
+          const double promised = -g.dot(moved) - 0.5 * moved.dot(H * moved);
+          const double kept = promised > 0 ? (cost - next_cost) / promised : 0;
+          damping = kept > 0.75 ? damping * 0.1 : kept < 0.3 ? std::max(damping, 1e-3) * 8 : damping;
           cost = next_cost;
           x = next;
           std::swap(now, trial);
-          damping = std::max(1e-9, damping * 0.2);
           better = true;
           break;
         }
       }
-      damping = std::min(1e9, std::max(damping, 1e-4) * 6);
+      damping = std::min(1e9, std::max(damping, 1e-4) * 8);
     }
     if (!better) break;
     linearise();
@@ -324,14 +336,17 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* wa
   }
   if (shared == own) return descend(problem, chosen, c, x, 60);
 
-  // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one valley.
+  // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one
+  // valley.
   const Cause& last = causes()[static_cast<std::size_t>(chosen.back().cause)];
   const int first = base_count + own - static_cast<int>(last.parameters.size());
   std::vector<std::vector<double>> starts;
   if (last.edit == Edit::cooling_step) {
     for (const double when : {0.15, 0.33, 0.5, 0.67, 0.85}) starts.push_back({0.1, when});
   } else if (last.parameters.front().logarithmic && last.parameters.size() == 2) {
-    for (const double shift : {0.0, -2.0}) starts.push_back({c[static_cast<std::size_t>(first)].start + shift, c[static_cast<std::size_t>(first) + 1].start - shift / 2});
+    for (const double shift : {0.0, -2.0})
+      starts.push_back(
+          {c[static_cast<std::size_t>(first)].start + shift, c[static_cast<std::size_t>(first) + 1].start - shift / 2});
   } else {
     starts = {{c[static_cast<std::size_t>(first)].start + 0.1 * c[static_cast<std::size_t>(first)].sd}};
   }
@@ -356,23 +371,28 @@ Fit transferred(const Problem& other, const Fit& from) {
   return descend(other, from.chosen, c, x, 30);
 }
 
-Physical physical(const Problem&, const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
+Physical physical(const Problem&, const Eigen::VectorXd& x) {
+  return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])};
+}
 
 double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate) {
   const Parameter& parameter = cause.parameters[static_cast<std::size_t>(p)];
   return (parameter.logarithmic ? std::exp(coordinate) : coordinate) * problem.scale(parameter.scale, cause.drive);
 }
 
-Model<double> model_of(const Problem& problem, const Fit& f, int log) { return build<double>(problem, f.chosen, f.x.data(), log); }
+Model<double> model_of(const Problem& problem, const Fit& f, int log) {
+  return build<double>(problem, f.chosen, f.x.data(), log);
+}
 
 Replayed replayed(const Problem& problem, const Fit& f, int l) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
-  const Eigen::Index own = f.x.size() - per_log_count * static_cast<Eigen::Index>(problem.logs.size() - static_cast<std::size_t>(l));
+  const Eigen::Index own =
+      f.x.size() - per_log_count * static_cast<Eigen::Index>(problem.logs.size() - static_cast<std::size_t>(l));
   const auto model = model_of(problem, f, l);
   Replayed out;
   Whitener white(problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.slow_s, log.width_s);
   double slow = 0;
-  replay(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1, const double*) {
+  replay(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
     const Bin& bin = log.bins[k];
     out.housing_degC.push_back(y2);
     out.core_degC.push_back(y1);
@@ -403,7 +423,8 @@ Error error_of(const std::vector<double>& residual_K, std::size_t from, std::siz
   return n > 0 ? Error{std::sqrt(sum / n), worst, n} : Error{missing, missing, 0};
 }
 
-double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
+               Eigen::VectorXd* gradient) {
   Evaluation e;
   if (!evaluate_any(problem, chosen, x, e)) return impossible;
   if (gradient != nullptr) *gradient = e.gradient;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Fits the two-resistor model, with any causes added, to all logs of a problem at once.
 //
-// Levenberg-Marquardt on whitened residuals with exact sensitivities (dual.hpp), box bounds and weak priors. Coordinates:
-// ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log the housing's
-// initial temperature and the winding's excess over it.
+// Levenberg-Marquardt on whitened residuals with exact sensitivities (dual.hpp), box bounds and weak priors.
+// Coordinates: ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log
+// the housing's initial temperature and the winding's excess over it.
 #pragma once
 
 #include <Eigen/Dense>
@@ -17,15 +17,15 @@ inline constexpr int base_count = 4, per_log_count = 2;
 
 struct Fit {
   std::vector<Chosen> chosen;
-  Eigen::VectorXd x;             // coordinates
+  Eigen::VectorXd x;  // coordinates
   Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;   // of data and prior (Gauss-Newton Hessian)
-  Eigen::MatrixXd from_data;     // of the data alone
-  double cost = 1e300;           // half the sum of squared whitened residuals, plus prior
-  double misfit = 1e300;         // the same without prior
-  int readings = 0;              // whitened residuals that entered
+  Eigen::MatrixXd information;  // of data and prior (Gauss-Newton Hessian)
+  Eigen::MatrixXd from_data;    // of the data alone
+  double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
+  double misfit = 1e300;        // the same without prior
+  int readings = 0;             // whitened residuals that entered
   int iterations = 0;
-  bool settled = false;          // no coordinate would move by more than 1/20 of its standard error
+  bool settled = false;  // no coordinate would move by more than 1/20 of its standard error
   std::vector<bool> at_bound;
 
   int cause_coordinates() const;
@@ -42,9 +42,9 @@ Fit transferred(const Problem& other, const Fit& from);
 
 /// What a fit simulates for one log: readings at every bin (also where nothing was measured) and the raw residuals.
 struct Replayed {
-  std::vector<double> housing_degC, core_degC;             // as the sensors would read
-  std::vector<double> housing_residual_K, core_residual_K; // measured - simulated, NaN where nothing was measured
-  std::vector<double> whitened;                            // housing residual whitened, NaN likewise
+  std::vector<double> housing_degC, core_degC;              // as the sensors would read
+  std::vector<double> housing_residual_K, core_residual_K;  // measured - simulated, NaN where nothing was measured
+  std::vector<double> whitened;                             // housing residual whitened, NaN likewise
 };
 Replayed replayed(const Problem& problem, const Fit& fit, int log);
 
@@ -53,7 +53,8 @@ struct Error {
   double rms_K, worst_K;
   int readings;
 };
-Error error_of(const std::vector<double>& residual_K, std::size_t from = 0, std::size_t to = static_cast<std::size_t>(-1));
+Error error_of(const std::vector<double>& residual_K, std::size_t from = 0,
+               std::size_t to = static_cast<std::size_t>(-1));
 
 /// Physical values.
 struct Physical {
@@ -67,6 +68,7 @@ double parameter_value(const Problem& problem, const Cause& cause, int p, double
 Model<double> model_of(const Problem& problem, const Fit& fit, int log);
 
 /// Cost alone at given coordinates (tests compare sensitivities with differences of this), and with gradient.
-double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x, Eigen::VectorXd* gradient = nullptr);
+double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
+               Eigen::VectorXd* gradient = nullptr);
 
 }  // namespace identify

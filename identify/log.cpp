@@ -21,10 +21,15 @@ using wire::pc::UserError;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 const std::array<std::string, role_count>& own_names() {
-  static const std::array<std::string, role_count> names = {
-      "time_s",       "current_A",    "id_A",        "iq_A",                   "power_W",    "speed_rad_per_s", "bus_V",
-      "bus_A",        "core_degC",    "housing_degC", "ambient_degC",          "coolant_degC", "frame_degC",
-      "neighbour_housing_degC", "board_degC", "winding_ohm", "session"};
+  static const std::array<std::string, role_count> names = {"time_s",       "current_A",
+                                                            "id_A",         "iq_A",
+                                                            "power_W",      "speed_rad_per_s",
+                                                            "bus_V",        "bus_A",
+                                                            "core_degC",    "housing_degC",
+                                                            "ambient_degC", "coolant_degC",
+                                                            "frame_degC",   "neighbour_housing_degC",
+                                                            "board_degC",   "winding_ohm",
+                                                            "session"};
   return names;
 }
 
@@ -43,9 +48,10 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
   std::map<Role, Source> found;
   for (const auto& [role, source] : map.columns) {
     if (table.find(source.column) < 0) {
-      throw UserError(Exit::unusable, fmt::format("{}: column '{}' for {} is missing{}; the file has: {}.", table.file, source.column,
-                                                  own_name(role), wire::pc::did_you_mean(source.column, table.names),
-                                                  fmt::join(table.names, ", ")));
+      throw UserError(Exit::unusable,
+                      fmt::format("{}: column '{}' for {} is missing{}; the file has: {}.", table.file, source.column,
+                                  own_name(role), wire::pc::did_you_mean(source.column, table.names),
+                                  fmt::join(table.names, ", ")));
     }
     found[role] = source;
   }
@@ -60,12 +66,15 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
     const std::size_t cut = name.find('_', name.rfind("speed", 0) == 0 ? 5 : name.rfind("neighbour", 0) == 0 ? 17 : 0);
     if (cut == std::string::npos || role == Role::session) continue;
     for (const std::string& header : table.names) {
-      const bool mapped = std::any_of(map.columns.begin(), map.columns.end(), [&](const auto& m) { return m.second.column == header; });
+      const bool mapped =
+          std::any_of(map.columns.begin(), map.columns.end(), [&](const auto& m) { return m.second.column == header; });
       if (mapped || header.rfind(name.substr(0, cut + 1), 0) != 0) continue;
       const std::string unit = header.substr(cut + 1);
       if (const auto known = unit_named(unit); known && known->quantity == quantity_of(name.substr(cut + 1))) {
-        throw UserError(Exit::unusable, fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
-                                                    table.file, header, unit, name, name, header, unit));
+        throw UserError(
+            Exit::unusable,
+            fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
+                        table.file, header, unit, name, name, header, unit));
       }
     }
   }
@@ -75,8 +84,9 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
 void check_range(const Log& log, Role role, double low, double high, const std::string& unit) {
   for (const double v : log.of(role)) {
     if (v < low || v > high) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.",
-                                                  log.name, own_name(role), v, low, high, unit));
+      throw UserError(Exit::unusable,
+                      fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.",
+                                  log.name, own_name(role), v, low, high, unit));
     }
   }
 }
@@ -95,31 +105,36 @@ double largest_magnitude(const std::vector<double>& v) {
 
 /// Units that a header did not tell: values that no motor shows.
 void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
-  for (const Role role : {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
+  for (const Role role :
+       {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
     if (!log.has(role)) continue;
     const double low = lowest(log.of(role));
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
     if (low > 200) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
-                                                  log.name, own_name(role), low, own_name(role)));
-    }
-    // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may not.
-    if (role == Role::ambient && low > 55) {
       throw UserError(Exit::unusable,
-                      fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say --column ambient_degC=COLUMN:degF "
-                                  "(and the same for the other temperatures).",
-                                  log.name, low));
+                      fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
+                                  log.name, own_name(role), low, own_name(role)));
+    }
+    // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
+    // not.
+    if (role == Role::ambient && low > 55) {
+      throw UserError(Exit::unusable, fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like "
+                                                  "Fahrenheit; say --column ambient_degC=COLUMN:degF "
+                                                  "(and the same for the other temperatures).",
+                                                  log.name, low));
     }
     check_range(log, role, -80, 600, "degC");
   }
-  // 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A is
-  // beyond any board this project drives or any traction log it was shown.
+  // 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A
+  // is beyond any board this project drives or any traction log it was shown.
   const double most_A = motor ? 40 * motor->rated_current_A : 1000;
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} reaches {:.0f} A, more than {:.0f} A can be; if it is in mA say --column {}=COLUMN:mA.",
-                                                  log.name, own_name(role), peak, most_A, own_name(role)));
+      throw UserError(
+          Exit::unusable,
+          fmt::format("{}: {} reaches {:.0f} A, more than {:.0f} A can be; if it is in mA say --column {}=COLUMN:mA.",
+                      log.name, own_name(role), peak, most_A, own_name(role)));
     }
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
@@ -129,15 +144,18 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
   const auto& t = log.of(Role::time);
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] < t[i - 1]) {
-      throw UserError(Exit::unusable,
-                      fmt::format("{}, line {}: time runs backwards from {:g} to {:g} s (two recordings joined, or two clocks); split the "
-                                  "file there or give it a session column.",
-                                  table.file, table.line[rows[i]], t[i - 1], t[i]));
+      throw UserError(
+          Exit::unusable,
+          fmt::format(
+              "{}, line {}: time runs backwards from {:g} to {:g} s (two recordings joined, or two clocks); split the "
+              "file there or give it a session column.",
+              table.file, table.line[rows[i]], t[i - 1], t[i]));
     }
   }
 }
 
-Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen, const std::string& name) {
+Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
+            const std::string& name) {
   Log log;
   log.name = name;
   const auto& time = table.columns[static_cast<std::size_t>(table.find(found.at(Role::time).column))];
@@ -149,7 +167,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     throw UserError(Exit::unusable, fmt::format("{}: {} of {} rows have no time; record the log again.", name,
                                                 chosen.size() - rows.size(), chosen.size()));
   }
-  if (rows.size() < chosen.size()) log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
+  if (rows.size() < chosen.size())
+    log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
     const auto& from = table.columns[static_cast<std::size_t>(table.find(source.column))];
@@ -162,7 +181,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     }
     if (!any) {
       to.clear();
-      log.notes.push_back(fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
+      log.notes.push_back(
+          fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
   check_time(table, log, rows);
@@ -184,7 +204,8 @@ void add_column(ColumnMap& map, const std::string& text) {
   const std::string rest = text.substr(equals + 1);
   const std::size_t colon = rest.rfind(':');
   Source source{rest.substr(0, colon)};
-  if (colon != std::string::npos) apply_unit(rest.substr(colon + 1), own_name(role), "--column " + text, source.factor, source.offset);
+  if (colon != std::string::npos)
+    apply_unit(rest.substr(colon + 1), own_name(role), "--column " + text, source.factor, source.offset);
   map.columns[role] = source;
 }
 
@@ -192,14 +213,16 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   const auto found = resolve(table, map);
   const auto need = [&](bool there, const std::string& what, const std::string& hint) {
     if (!there) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint, fmt::join(table.names, ", ")));
+      throw UserError(Exit::unusable, fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
+                                                  fmt::join(table.names, ", ")));
     }
   };
   const auto has = [&](Role r) { return found.count(r) != 0; };
   need(has(Role::time), "a time column", "call it time_s or say --column time_s=NAME");
-  need(has(Role::current) || (has(Role::id) && has(Role::iq)) || has(Role::power), "the heat input (current_A, id_A and iq_A, or power_W)",
-       "map it with --column current_A=NAME");
-  need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)", "map it with --column housing_degC=NAME");
+  need(has(Role::current) || (has(Role::id) && has(Role::iq)) || has(Role::power),
+       "the heat input (current_A, id_A and iq_A, or power_W)", "map it with --column current_A=NAME");
+  need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)",
+       "map it with --column housing_degC=NAME");
 
   std::map<double, std::vector<std::size_t>> sessions;
   const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
@@ -209,7 +232,8 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   }
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
-    Log log = one_log(table, found, rows, sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
+    Log log = one_log(table, found, rows,
+                      sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
     check_values(log, motor);
     mask(log);
     logs.push_back(std::move(log));

@@ -19,7 +19,23 @@
 namespace identify {
 
 enum class Role {
-  time, current, id, iq, power, speed, bus_V, bus_A, core, housing, ambient, coolant, frame, neighbour, board, winding_ohm, session,
+  time,
+  current,
+  id,
+  iq,
+  power,
+  speed,
+  bus_V,
+  bus_A,
+  core,
+  housing,
+  ambient,
+  coolant,
+  frame,
+  neighbour,
+  board,
+  winding_ohm,
+  session,
   count
 };
 inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
@@ -49,8 +65,8 @@ struct Log {
   std::array<std::vector<double>, role_count> columns;
   std::vector<std::string> notes;  // what was repaired, masked or assumed, one sentence each
   int rows_frozen = 0, rows_missing = 0;
-  double missing_share = 0;        // of the housing (or core) readings and of the input, what had to be masked
-  double gap_share = 0;            // of the duration, what lies in gaps
+  double missing_share = 0;  // of the housing (or core) readings and of the input, what had to be masked
+  double gap_share = 0;      // of the duration, what lies in gaps
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
   std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }

@@ -32,7 +32,8 @@ struct Arguments {
   bool explain = false;
 };
 
-std::vector<Log> read(const std::string& path, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
+std::vector<Log> read(const std::string& path, const identify::ColumnMap& map,
+                      const std::optional<wire::pc::MotorFile>& motor) {
   return identify::logs_of(identify::read_table(path), map, motor ? std::optional(motor->motor) : std::nullopt);
 }
 
@@ -43,7 +44,8 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   char* end = nullptr;
   const double fraction = std::strtod(what.c_str(), &end);
   if (*end == '\0') {
-    if (!(fraction > 0 && fraction < 0.9)) throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9.");
+    if (!(fraction > 0 && fraction < 0.9))
+      throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9.");
     out.fraction = fraction;
     return out;
   }
@@ -90,9 +92,11 @@ int main(int argc, char** argv) {
   CLI::App app{examples};
   Arguments a;
   app.add_option("LOG", a.logs, "CSV logs of one motor")->required();
-  app.add_option("--motor", a.motor, "motor file (.toml), or the name of one in boards/motors; without it priors are wide");
+  app.add_option("--motor", a.motor,
+                 "motor file (.toml), or the name of one in boards/motors; without it priors are wide");
   app.add_option("--map", a.map, "TOML file that says which column is what");
-  app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")->allow_extra_args(false);
+  app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")
+      ->allow_extra_args(false);
   app.add_option("--hold-out", a.hold_out, "a log, or a fraction of each log, that is scored and not fitted");
   app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
   app.add_option("--html", a.html, "write a page with pictures");
@@ -111,7 +115,8 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "{}\n", error.what());
     return error.exit_code();
   } catch (const std::exception& error) {
-    fmt::print(stderr, "identify stopped: {}. This is a fault of the program; please report it with the log.\n", error.what());
+    fmt::print(stderr, "identify stopped: {}. This is a fault of the program; please report it with the log.\n",
+               error.what());
     return static_cast<int>(Exit::unusable);
   }
 }

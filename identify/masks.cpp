@@ -56,8 +56,9 @@ void report_frozen(Log& log, Role role, std::vector<double>& v) {
     if (t[to - 1] - t[from] > longest_s) longest_s = t[to - 1] - t[from], from_s = t[from];
   }
   log.rows_frozen += static_cast<int>(rows);
-  log.notes.push_back(fmt::format("{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s); masked.",
-                                  own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
+  log.notes.push_back(
+      fmt::format("{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s); masked.",
+                  own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
 }
 
 }  // namespace
@@ -99,28 +100,36 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
 
 void mask(Log& log) {
   const auto& t = log.of(Role::time);
-  for (const Role role : {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
+  for (const Role role :
+       {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
     if (log.has(role)) report_frozen(log, role, log.of(role));
   }
 
   // Input: what heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
   std::vector<Role> input = {Role::power};
-  if (!log.has(Role::power)) input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
+  if (!log.has(Role::power))
+    input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
   for (const Role role : input) {
     const double share = static_cast<double>(count_missing(log.of(role))) / static_cast<double>(t.size());
     log.missing_share = std::max(log.missing_share, share);
     if (share > 0.3) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
-                                                  "again with every row filled.",
-                                                  log.name, own_name(role), 100 * share));
+      throw UserError(
+          Exit::unusable,
+          fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
+                      "again with every row filled.",
+                      log.name, own_name(role), 100 * share));
     }
-    if (share > 0) log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.", own_name(role), 100 * share));
+    if (share > 0)
+      log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.",
+                                      own_name(role), 100 * share));
   }
   for (const Role role : {Role::housing, Role::core}) {
     if (!log.has(role)) continue;
     const double share = holes(log.of(role));
     log.rows_missing += static_cast<int>(share * static_cast<double>(t.size()));
-    if (share > 0.02) log.notes.push_back(fmt::format("{} is missing in {:.0f} % of its readings; left out of the fit.", own_name(role), 100 * share));
+    if (share > 0.02)
+      log.notes.push_back(
+          fmt::format("{} is missing in {:.0f} % of its readings; left out of the fit.", own_name(role), 100 * share));
     if (role == Role::housing || !log.has(Role::housing)) log.missing_share = std::max(log.missing_share, share);
   }
 
@@ -130,17 +139,20 @@ void mask(Log& log) {
   double lost_s = 0;
   int gaps = 0;
   for (const double dt : spacing) {
-    // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are formed.
+    // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are
+    // formed.
     if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) lost_s += dt - usual, ++gaps;
   }
   const double duration = t.back() - t.front();
   log.gap_share = duration > 0 ? lost_s / duration : 0;
   if (gaps > 0) {
-    log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.", gaps, gaps == 1 ? "" : "s",
-                                    lost_s, duration, gaps == 1 ? "it" : "them"));
+    log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
+                                    gaps, gaps == 1 ? "" : "s", lost_s, duration, gaps == 1 ? "it" : "them"));
   }
   const bool any = log.has(Role::housing) || log.has(Role::core);
-  if (!any) throw UserError(Exit::unusable, log.name + ": no temperature of the motor is left; record the housing or the winding.");
+  if (!any)
+    throw UserError(Exit::unusable,
+                    log.name + ": no temperature of the motor is left; record the housing or the winding.");
 }
 
 }  // namespace identify

@@ -13,15 +13,14 @@ template <class S>
 struct Model {
   thermal::HeatSet<S> set{};
   int core = 0, housing = 1;
-  int hot_node = -1;          // an end winding of its own; a core reading is then the mean of both by their copper
-  double hot_share = 0;       // its part of the copper
-  int sink_link = 1;          // housing to ambient or coolant
+  int hot_node = -1;     // an end winding of its own; a core reading is then the mean of both by their copper
+  double hot_share = 0;  // its part of the copper
+  int sink_link = 1;     // housing to ambient or coolant
 
   S current_offset_A = S(0);  // true current = recorded + offset
   S delay_s = S(0);           // temperatures answer to the inputs of so long ago
   S drift_K_per_s = S(0);     // true sink = recorded + drift * time
   S stall_share = S(0);       // extra share of copper heat while the rotor stands
-  S regen_share = S(0);
   S cooling_factor = S(1);    // of the sink conductance, from cooling_from_s on
   S cooling_from_s = S(0);
   bool offset = false, delayed = false, drifts = false, stalls = false, cooling_changes = false;

@@ -14,10 +14,10 @@ namespace {
 
 using thermal::Drive;
 
-double drive(const Bin& bin, Drive d) { return bin.drive[static_cast<int>(d)]; }
+double drive(const Bin& bin, Drive d) { return bin.input[d]; }
 
-/// The slow part of the housing noise, from rest. Second differences over eight seconds cancel the cooling curve's slope;
-/// a first-order process of 20 s correlation keeps this much of its variance in them.
+/// The slow part of the housing noise, from rest. Second differences over eight seconds cancel the cooling curve's
+/// slope; a first-order process of 20 s correlation keeps this much of its variance in them.
 void noise_from_rest(Problem& problem) {
   constexpr double lag_s = 8, slow_s = 20;
   const double rho = std::exp(-lag_s / slow_s), kept = 6 - 8 * rho + 2 * rho * rho;
@@ -28,19 +28,31 @@ void noise_from_rest(Problem& problem) {
     reading2 += log.housing_noise_K * log.housing_noise_K;
     ++logs;
     const auto j = static_cast<std::size_t>(std::max(1.0, std::round(lag_s / log.width_s)));
-    for (std::size_t k = j; k + j < log.bins.size(); ++k) {
-      bool rest = true;
-      for (std::size_t i = k - j; rest && i <= k + j; ++i) rest = log.bins[i].idle;
-      if (!rest) continue;
+    const auto block = static_cast<std::size_t>(90 / log.width_s) + 1;
+    const auto after_load = static_cast<std::size_t>(20 / log.width_s);  // the winding still empties into the housing
+    std::size_t resting = 0;
+    std::vector<double> differences;
+    const auto close = [&] {  // what a block's differences share is the cooling curve's curvature
+      double mean = 0;
+      for (const double d : differences) mean += d / static_cast<double>(differences.size());
+      for (const double d : differences)
+        sum += (d - mean) * (d - mean) * 1.2;  // a block holds about six independent ones
+      n += static_cast<int>(differences.size());
+      differences.clear();
+    };
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      resting = log.bins[k].idle ? resting + 1 : 0;
+      if (resting == 0 || differences.size() >= block) close();
+      if (resting <= 2 * j + after_load) continue;
       rest_s += log.width_s;
-      const Bin &a = log.bins[k - j], &b = log.bins[k], &c = log.bins[k + j];
+      const Bin &a = log.bins[k - 2 * j], &b = log.bins[k - j], &c = log.bins[k];
       if (std::isnan(a.housing_degC) || std::isnan(b.housing_degC) || std::isnan(c.housing_degC)) continue;
-      const double d = a.housing_degC - 2 * b.housing_degC + c.housing_degC;
-      sum += d * d;
+      differences.push_back(a.housing_degC - 2 * b.housing_degC + c.housing_degC);
       white += log.housing_noise_K * log.housing_noise_K *
-               (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) + 1 / static_cast<double>(c.housing_n));
-      ++n;
+               (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) +
+                1 / static_cast<double>(c.housing_n));
     }
+    close();
   }
   Noise& noise = problem.noise;
   // A perfectly repeating channel still has its last digit.
@@ -78,10 +90,11 @@ void scales(Problem& problem) {
   for (double& m : problem.drive_mean) m = 0;
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) {
-      for (int d = 0; d < thermal::drive_count; ++d) problem.drive_mean[d] += bin.drive[d];
-      heat += problem.heated_by_power() ? std::abs(drive(bin, Drive::power_W)) : problem.belief.ohm * drive(bin, Drive::current_A2);
+      for (int d = 0; d < thermal::drive_count; ++d) problem.drive_mean[d] += bin.input.drive[d];
+      heat += problem.heated_by_power() ? std::abs(drive(bin, Drive::power_W))
+                                        : problem.belief.ohm * drive(bin, Drive::current_A2);
       amps2 += drive(bin, Drive::current_A2);
-      speed08 += bin.speed08;
+      speed08 += bin.input[Drive::speed_to_0_8];
       n += 1;
     }
     problem.duration_s = std::max(problem.duration_s, log.duration_s());
@@ -98,7 +111,7 @@ void rough_search(Problem& problem) {
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) {
       const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
-      if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.boundary_degC[0]);
+      if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
     }
   }
   Belief best;
@@ -135,17 +148,28 @@ bool Problem::any_core() const {
 
 double Problem::scale(Scale s, Drive d) const {
   switch (s) {
-    case Scale::one: return 1;
-    case Scale::heat_per_drive: return drive_mean[static_cast<int>(d)] > 0 ? heat_W / drive_mean[static_cast<int>(d)] : 0;
-    case Scale::heat: return heat_W;
-    case Scale::sink_conductance: return 1 / belief.R2_K_per_W;
-    case Scale::core_capacity: return belief.C1_J_per_K;
-    case Scale::housing_capacity: return belief.C2_J_per_K;
-    case Scale::core_resistance: return belief.R1_K_per_W;
-    case Scale::sink_resistance: return belief.R2_K_per_W;
-    case Scale::rms_current: return rms_A;
-    case Scale::duration: return duration_s;
-    case Scale::speed08: return speed08_mean > 0 ? 1 / speed08_mean : 0;
+    case Scale::one:
+      return 1;
+    case Scale::heat_per_drive:
+      return drive_mean[static_cast<int>(d)] > 0 ? heat_W / drive_mean[static_cast<int>(d)] : 0;
+    case Scale::heat:
+      return heat_W;
+    case Scale::sink_conductance:
+      return 1 / belief.R2_K_per_W;
+    case Scale::core_capacity:
+      return belief.C1_J_per_K;
+    case Scale::housing_capacity:
+      return belief.C2_J_per_K;
+    case Scale::core_resistance:
+      return belief.R1_K_per_W;
+    case Scale::sink_resistance:
+      return belief.R2_K_per_W;
+    case Scale::rms_current:
+      return rms_A;
+    case Scale::duration:
+      return duration_s;
+    case Scale::speed08:
+      return speed08_mean > 0 ? 1 / speed08_mean : 0;
   }
   return 1;
 }
@@ -154,25 +178,35 @@ bool Problem::possible(const Cause& cause) const {
   const auto any = [&](auto what) { return std::any_of(logs.begin(), logs.end(), what); };
   const bool amps = rms_A > 0 && !heated_by_power();
   switch (cause.needs) {
-    case Needs::nothing: return true;
-    case Needs::current: return amps;
-    case Needs::copper: return amps && belief.copper_per_K > 0;
+    case Needs::nothing:
+      return true;
+    case Needs::current:
+      return amps;
+    case Needs::copper:
+      return amps && belief.copper_per_K > 0;
     case Needs::speed: {
-      const bool loaded = cause.drive == Drive::current_speed || cause.drive == Drive::current2_speed2 || cause.edit == Edit::stall_share;
+      const bool loaded = cause.drive == Drive::current_speed || cause.drive == Drive::current2_speed2 ||
+                          cause.edit == Edit::stall_share;
       return speed08_mean > 0 && (!loaded || amps);
     }
     case Needs::signed_current: {
-      const bool plus = any([](const Bins& b) { return std::any_of(b.bins.begin(), b.bins.end(), [](const Bin& x) { return x.signed_A > 0; }); });
+      const bool plus = any([](const Bins& b) {
+        return std::any_of(b.bins.begin(), b.bins.end(), [](const Bin& x) { return x.signed_A > 0; });
+      });
       return amps && plus;
     }
-    case Needs::neighbour: return any([](const Bins& b) { return b.has_neighbour; });
-    case Needs::frame: return any([](const Bins& b) { return b.has_frame; });
-    case Needs::several_logs: return logs.size() > 1;
+    case Needs::neighbour:
+      return any([](const Bins& b) { return b.has_neighbour; });
+    case Needs::frame:
+      return any([](const Bins& b) { return b.has_frame; });
+    case Needs::several_logs:
+      return logs.size() > 1;
   }
   return true;
 }
 
-Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, std::optional<double> copper_per_K) {
+Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
+                   std::optional<double> copper_per_K) {
   Problem problem;
   double finest_s = 1;
   if (motor) {
@@ -187,7 +221,7 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     b.C1_J_per_K = m.C1_J_per_K;
     b.C2_J_per_K = m.C2_J_per_K;
     b.winding_max_degC = m.winding_max_degC;
-    finest_s = m.R1_K_per_W * m.C1_J_per_K / 3;
+    finest_s = m.R1_K_per_W * m.C1_J_per_K / 2;
   }
   if (copper_per_K) problem.belief.copper_per_K = *copper_per_K;
   for (const Log& log : logs) problem.logs.push_back(bins_of(log, finest_s));
@@ -195,9 +229,11 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   noise_from_rest(problem);
   scales(problem);
   if (!(problem.heat_W > 0)) {
-    throw wire::pc::UserError(wire::pc::Exit::unusable,
-                              fmt::format("{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
-                                          problem.logs.front().name));
+    throw wire::pc::UserError(
+        wire::pc::Exit::unusable,
+        fmt::format(
+            "{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
+            problem.logs.front().name));
   }
   if (!motor) rough_search(problem);
   return problem;

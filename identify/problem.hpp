@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One identification task: the logs of one motor, where its parameters are believed to lie, and how noisy the readings are.
+// One identification task: the logs of one motor, where its parameters are believed to lie, and how noisy the readings
+// are.
 #pragma once
 
 #include <optional>
@@ -14,13 +15,13 @@ namespace identify {
 
 /// Where the fit starts and how far it may be off.
 struct Belief {
-  bool known = false;           // a motor file was given; otherwise found from the data, and as good as unknown
+  bool known = false;  // a motor file was given; otherwise found from the data, and as good as unknown
   std::string motor = "unknown";
-  double ohm = 1;               // heat per squared amplitude, 3/2 R_phase at 25 degC; 1 when unknown: only P R and P/C are then seen
+  double ohm = 1;  // heat per squared amplitude, 3/2 R_phase at 25 degC; 1 when unknown: only P R and P/C are then seen
   double copper_per_K = 0.00393;
   double R1_K_per_W = 1, R2_K_per_W = 5, C1_J_per_K = 10, C2_J_per_K = 200;
-  double log_sd = 0.7;          // sheets are good to 30 %, shipped actuators scale R1 by 1.8 (thermal.md); twice that
-  double log_room = 3.4;        // box: a factor of 30 either way
+  double log_sd = 0.7;    // sheets are good to 30 %, shipped actuators scale R1 by 1.8 (thermal.md); twice that
+  double log_room = 3.4;  // box: a factor of 30 either way
   double winding_max_degC = 155;
 };
 
@@ -28,14 +29,14 @@ struct Belief {
 struct Noise {
   double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
   double core_white_K = 1, core_slow_K = 0;
-  double idle_s = 0;            // how much rest it was taken from; 0: assumed
+  double idle_s = 0;  // how much rest it was taken from; 0: assumed
 };
 
 struct Problem {
   std::vector<Bins> logs;
   Belief belief;
   Noise noise;
-  double heat_W = 1;                       // mean copper heat, and means of the drives: the scales of cause.hpp
+  double heat_W = 1;  // mean copper heat, and means of the drives: the scales of cause.hpp
   double drive_mean[thermal::drive_count] = {};
   double rms_A = 1, speed08_mean = 1, duration_s = 1;
 
@@ -45,8 +46,8 @@ struct Problem {
   bool possible(const Cause& cause) const;  // the logs hold what it needs
 };
 
-/// Bins the logs, takes the noise from rest, and settles the belief (from the sheet, or from the data by a rough search).
-/// `copper_per_K`: overrides the coefficient of the winding's resistance (0: constant).
+/// Bins the logs, takes the noise from rest, and settles the belief (from the sheet, or from the data by a rough
+/// search). `copper_per_K`: overrides the coefficient of the winding's resistance (0: constant).
 Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
                    std::optional<double> copper_per_K = std::nullopt);
 

@@ -19,7 +19,7 @@ struct ParameterLine {
 };
 
 struct Rmse {
-  double housing_K = 0, core_K = 0;      // NaN: not measured
+  double housing_K = 0, core_K = 0;  // NaN: not measured
   double housing_worst_K = 0, core_worst_K = 0;
 };
 
@@ -30,7 +30,7 @@ struct Rival {
 
 struct CauseLine {
   std::string id, name, signature;
-  double delta_bic = 0;                  // how much worse the answer is without it
+  double delta_bic = 0;  // how much worse the answer is without it
   std::vector<ParameterLine> parameters;
   std::vector<Rival> rivals;
 };
@@ -40,16 +40,16 @@ struct Variant {
   Rmse rmse;
 };
 
-struct Rung {                            // one candidate of the ladder
+struct Rung {  // one candidate of the ladder
   std::string id, name;
-  double delta_bic;                      // gain over the baseline
+  double delta_bic;  // gain over the baseline
   bool chosen, tied;
 };
 
 struct HeldOut {
   std::string how;
   Rmse before, after;
-  std::vector<Rmse> each_before;         // per log, when whole logs were held out
+  std::vector<Rmse> each_before;  // per log, when whole logs were held out
   std::vector<std::string> names;
 };
 
@@ -64,37 +64,38 @@ struct Experiment {
 };
 
 struct Gain {
-  double overshoot_before_K = 0, overshoot_after_K = 0, burst_s_before = 0, burst_s_after = 0, continuous_A_before = 0, continuous_A_after = 0;
+  double overshoot_before_K = 0, overshoot_after_K = 0, burst_s_before = 0, burst_s_after = 0, continuous_A_before = 0,
+         continuous_A_after = 0;
 };
 
 struct LogPlot {
   std::string name;
-  std::vector<double> time_s, heat, measured_housing, simulated_housing, measured_core, simulated_core, extended_housing, extended_core,
-      residual_housing, residual_core;
+  std::vector<double> time_s, heat, measured_housing, simulated_housing, measured_core, simulated_core,
+      extended_housing, extended_core, residual_housing, residual_core;
   std::string heat_label;
 };
 
 struct Report {
-  std::string verdict;                   // adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient
+  std::string verdict;  // adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient
   std::string sentence;
   std::string motor;
-  std::vector<std::string> notes;        // on the data: masked, assumed, repaired
-  std::vector<std::string> checks;       // gradient, residual, identifiability: passed or not, in words
+  std::vector<std::string> notes;   // on the data: masked, assumed, repaired
+  std::vector<std::string> checks;  // gradient, residual, identifiability: passed or not, in words
   bool converged = false;
   std::vector<ParameterLine> baseline;
   Rmse baseline_rmse;
   Structure structure;
   std::vector<Variant> variants;
-  std::vector<std::string> loose;        // directions that this data does not determine, in words
-  std::string core_refusal;              // empty: a core temperature may be stated
+  std::vector<std::string> loose;  // directions that this data does not determine, in words
+  std::string core_refusal;        // empty: a core temperature may be stated
   std::vector<CauseLine> causes;
   std::vector<Rung> ladder;
   std::optional<HeldOut> held_out;
   std::optional<Gain> gain;
   std::optional<Experiment> experiment;
-  std::string model_toml;                // the parameter set (--write-model)
+  std::string model_toml;  // the parameter set (--write-model)
   std::string model_file;
-  std::vector<std::string> reasoning;    // --explain
+  std::vector<std::string> reasoning;  // --explain
   std::vector<LogPlot> plots;
   double fit_ms = 0;
   int iterations = 0;

@@ -15,11 +15,16 @@ namespace {
 std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
-    if (c == '<') out += "&lt;";
-    else if (c == '>') out += "&gt;";
-    else if (c == '&') out += "&amp;";
-    else if (c == '"') out += "&quot;";
-    else out += c;
+    if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '&')
+      out += "&amp;";
+    else if (c == '"')
+      out += "&quot;";
+    else
+      out += c;
   }
   return out;
 }
@@ -28,15 +33,16 @@ bool any(const std::vector<double>& v) {
   return std::any_of(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
 }
 
-/// gnuplot writes <svg ...> after an XML prologue that has no place inside a page, and fixed ids (clip paths, symbols) that
-/// would collide between two pictures of one page.
+/// gnuplot writes <svg ...> after an XML prologue that has no place inside a page, and fixed ids (clip paths, symbols)
+/// that would collide between two pictures of one page.
 std::string inlined(const std::string& svg, std::size_t number) {
   const std::size_t at = svg.find("<svg");
   std::string out = at == std::string::npos ? "" : svg.substr(at);
   const std::string tag = fmt::format("plot{}_", number);
   for (const char* where : {"id=\"", "id='", "url(#", "href=\"#", "href='#"}) {
     const std::string key = where;
-    for (std::size_t p = out.find(key); p != std::string::npos; p = out.find(key, p + key.size() + tag.size())) out.insert(p + key.size(), tag);
+    for (std::size_t p = out.find(key); p != std::string::npos; p = out.find(key, p + key.size() + tag.size()))
+      out.insert(p + key.size(), tag);
   }
   return out;
 }
@@ -44,8 +50,9 @@ std::string inlined(const std::string& svg, std::size_t number) {
 std::string picture(const Report& r, std::size_t l) {
   const LogPlot& p = r.plots[l];
   const bool extended = !p.extended_housing.empty();
-  const bool sparse = std::count_if(p.measured_core.begin(), p.measured_core.end(), [](double x) { return !std::isnan(x); }) * 4 <
-                      static_cast<std::ptrdiff_t>(p.measured_core.size());
+  const bool sparse =
+      std::count_if(p.measured_core.begin(), p.measured_core.end(), [](double x) { return !std::isnan(x); }) * 4 <
+      static_cast<std::ptrdiff_t>(p.measured_core.size());
   wire::pc::Picture out;
   out.title = p.name;
   out.x_label = "time, s";
@@ -57,17 +64,21 @@ std::string picture(const Report& r, std::size_t l) {
     temperatures.curves.push_back({"winding measured", p.time_s, p.measured_core, "#d55e00", false, sparse});
     residual.curves.push_back({"winding" + before, p.time_s, p.residual_core, "#d55e00", extended, sparse});
   }
-  if (any(p.measured_core) || r.core_refusal.empty()) temperatures.curves.push_back({"winding simulated" + before, p.time_s, p.simulated_core, "#e69f00", true});
+  if (any(p.measured_core) || r.core_refusal.empty())
+    temperatures.curves.push_back({"winding simulated" + before, p.time_s, p.simulated_core, "#e69f00", true});
   if (any(p.measured_housing)) {
     temperatures.curves.push_back({"housing measured", p.time_s, p.measured_housing, "#0072b2"});
     residual.curves.push_back({"housing" + before, p.time_s, p.residual_housing, "#0072b2", extended});
   }
   temperatures.curves.push_back({"housing simulated" + before, p.time_s, p.simulated_housing, "#56b4e9", true});
   if (extended) {
-    if (any(p.measured_core) || r.core_refusal.empty()) temperatures.curves.push_back({"winding, extended", p.time_s, p.extended_core, "#009e73"});
+    if (any(p.measured_core) || r.core_refusal.empty())
+      temperatures.curves.push_back({"winding, extended", p.time_s, p.extended_core, "#009e73"});
     std::vector<double> core(p.time_s.size()), housing(p.time_s.size());
-    for (std::size_t k = 0; k < core.size(); ++k) core[k] = p.measured_core[k] - p.extended_core[k], housing[k] = p.measured_housing[k] - p.extended_housing[k];
-    if (any(p.measured_core)) residual.curves.push_back({"winding, extended", p.time_s, core, "#009e73", false, sparse});
+    for (std::size_t k = 0; k < core.size(); ++k)
+      core[k] = p.measured_core[k] - p.extended_core[k], housing[k] = p.measured_housing[k] - p.extended_housing[k];
+    if (any(p.measured_core))
+      residual.curves.push_back({"winding, extended", p.time_s, core, "#009e73", false, sparse});
     if (any(p.measured_housing)) residual.curves.push_back({"housing, extended", p.time_s, housing, "#404040"});
   }
   residual.levels.push_back({0, ""});
@@ -75,7 +86,8 @@ std::string picture(const Report& r, std::size_t l) {
     if (static_cast<std::size_t>(w.log) != l) continue;
     const bool winding = w.channel == "winding";
     if (winding != any(p.measured_core)) continue;  // one channel's stretches: two layers of tint hide each other
-    residual.stretches.push_back({w.from_s, w.to_s, fmt::format("{:+.1f} K", w.mean_K), w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
+    residual.stretches.push_back(
+        {w.from_s, w.to_s, fmt::format("{:+.1f} K", w.mean_K), w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
     temperatures.stretches.push_back({w.from_s, w.to_s, "", w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
   }
   out.panels = {temperatures, residual, {p.heat_label, {{"", p.time_s, p.heat, "#404040"}}}};
@@ -94,7 +106,9 @@ std::string parameter_rows(const std::vector<ParameterLine>& lines) {
   std::string s;
   for (const ParameterLine& p : lines) {
     s += row({escaped(p.name), fmt::format("{:.4g} ± {:.2g}", p.value, p.std_error), escaped(p.unit),
-              p.at_bound ? "at its bound" : p.determined ? "determined" : "<em>not determined by this data</em>"});
+              p.at_bound     ? "at its bound"
+              : p.determined ? "determined"
+                             : "<em>not determined by this data</em>"});
   }
   return s;
 }
@@ -102,13 +116,19 @@ std::string parameter_rows(const std::vector<ParameterLine>& lines) {
 std::string bars(const Report& r) {
   double most = 10;
   for (const Rung& rung : r.ladder) most = std::max(most, rung.delta_bic);
-  std::string s = "<h2>Candidates</h2><p>Evidence gained over the two-resistor model; 10 are asked for before anything is named, and a lead of 6 before one "
-                  "is named alone.</p><table class=ladder>\n";
+  std::string s =
+      "<h2>Candidates</h2><p>Evidence gained over the two-resistor model; 10 are asked for before anything is named, "
+      "and a lead of 6 before one "
+      "is named alone.</p><table class=ladder>\n";
   for (const Rung& rung : r.ladder) {
     // Evidence spans decades: the bar is its square root.
     const double width = 100 * std::sqrt(std::max(0.0, rung.delta_bic) / most);
-    s += fmt::format("<tr class='{}'><td>{}</td><td><div style='width:{:.1f}%'></div></td><td>{:.1f}</td><td>{}</td></tr>\n",
-                     rung.chosen ? "chosen" : rung.tied ? "tied" : "", escaped(rung.id), width, rung.delta_bic, escaped(rung.name));
+    s += fmt::format(
+        "<tr class='{}'><td>{}</td><td><div style='width:{:.1f}%'></div></td><td>{:.1f}</td><td>{}</td></tr>\n",
+        rung.chosen ? "chosen"
+        : rung.tied ? "tied"
+                    : "",
+        escaped(rung.id), width, rung.delta_bic, escaped(rung.name));
   }
   return s + "</table>\n";
 }
@@ -117,49 +137,72 @@ constexpr const char* style =
     "body{font:15px/1.45 Helvetica,Arial,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#222}"
     "h1{font-size:1.35em;line-height:1.3}h2{font-size:1.1em;margin-top:1.8em;border-bottom:1px solid #ddd}"
     ".verdict{display:inline-block;padding:.15em .7em;border-radius:1em;color:#fff;background:#666}"
-    ".adequate,.explained{background:#009e73}.partly_explained,.ambiguous{background:#c98a00}.unknown_cause,.insufficient{background:#b03020}"
-    "table{border-collapse:collapse}td,th{padding:.2em .8em .2em 0;text-align:left;vertical-align:top}th{color:#666;font-weight:normal}"
-    ".ladder td:nth-child(2){width:300px}.ladder div{background:#b8c8d8;height:.9em}.chosen div{background:#009e73}.tied div{background:#e69f00}"
+    ".adequate,.explained{background:#009e73}.partly_explained,.ambiguous{background:#c98a00}.unknown_cause,."
+    "insufficient{background:#b03020}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em .2em "
+    "0;text-align:left;vertical-align:top}th{color:#666;font-weight:normal}"
+    ".ladder td:nth-child(2){width:300px}.ladder div{background:#b8c8d8;height:.9em}.chosen "
+    "div{background:#009e73}.tied div{background:#e69f00}"
     ".chosen td:first-child{font-weight:bold}svg{max-width:100%;height:auto}.warn{color:#a03010}";
 
 }  // namespace
 
 std::string as_html(const Report& r) {
-  std::string s = "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>identify: " + escaped(r.verdict) + "</title><style>" + style + "</style></head><body>\n";
-  s += fmt::format("<h1>{}</h1>\n<p><span class='verdict {}'>{}</span> &nbsp; motor: {}</p>\n", escaped(r.sentence), r.verdict, r.verdict, escaped(r.motor));
+  std::string s = "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>identify: " + escaped(r.verdict) +
+                  "</title><style>" + style + "</style></head><body>\n";
+  s += fmt::format("<h1>{}</h1>\n<p><span class='verdict {}'>{}</span> &nbsp; motor: {}</p>\n", escaped(r.sentence),
+                   r.verdict, r.verdict, escaped(r.motor));
   if (!r.core_refusal.empty()) s += "<p class=warn>" + escaped(r.core_refusal) + "</p>\n";
   for (std::size_t l = 0; l < r.plots.size(); ++l) s += inlined(picture(r, l), l) + "\n";
 
   if (!r.ladder.empty()) s += bars(r);
   for (const CauseLine& c : r.causes) {
-    s += fmt::format("<h2>Behaves like: {}</h2><p>{}. Evidence {:.1f}.</p><table>", escaped(c.id), escaped(c.name), c.delta_bic) + parameter_rows(c.parameters) + "</table>\n";
+    s += fmt::format("<h2>Behaves like: {}</h2><p>{}. Evidence {:.1f}.</p><table>", escaped(c.id), escaped(c.name),
+                     c.delta_bic) +
+         parameter_rows(c.parameters) + "</table>\n";
   }
-  s += "<h2>Errors</h2><table>" + row({"", "housing rms, K", "winding rms, K", "housing worst, K", "winding worst, K"}, "th");
-  const auto errors = [&](const std::string& what, const Rmse& e) { s += row({escaped(what), k(e.housing_K), k(e.core_K), k(e.housing_worst_K), k(e.core_worst_K)}); };
+  s += "<h2>Errors</h2><table>" +
+       row({"", "housing rms, K", "winding rms, K", "housing worst, K", "winding worst, K"}, "th");
+  const auto errors = [&](const std::string& what, const Rmse& e) {
+    s += row({escaped(what), k(e.housing_K), k(e.core_K), k(e.housing_worst_K), k(e.core_worst_K)});
+  };
   if (r.variants.empty()) errors("two-resistor model, fitted", r.baseline_rmse);
   for (const Variant& v : r.variants) errors("two-resistor model, " + v.what, v.rmse);
   if (r.held_out) {
-    for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i) errors("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
+    for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i)
+      errors("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
     errors("not seen (" + r.held_out->how + ")", r.held_out->before);
     if (!r.causes.empty()) errors("the same, extended model", r.held_out->after);
   }
   s += "</table>\n<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
   for (const Wrong& w : r.structure.wrong) {
-    s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") + fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s), w.channel,
-              fmt::format("{:.2f} K {}", std::abs(w.mean_K), w.mean_K > 0 ? "hotter than simulated" : "cooler than simulated"), escaped(w.goes_with)});
+    s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") +
+                  fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),
+              w.channel,
+              fmt::format("{:.2f} K {}", std::abs(w.mean_K),
+                          w.mean_K > 0 ? "hotter than simulated" : "cooler than simulated"),
+              escaped(w.goes_with)});
   }
-  s += "</table>\n" + fmt::format("<p>The residual is {:.2f} times the noise; chance of so unwhite a residual from a right model: {:.2g} (cumulated periodogram), {:.2g} "
-                                  "(Ljung-Box).</p>\n<table>",
-                                  r.structure.housing.ratio, r.structure.housing.white_p, r.structure.housing.ljung_box_p);
+  s += "</table>\n" + fmt::format(
+                          "<p>The residual is {:.2f} times the noise; chance of so unwhite a residual from a right "
+                          "model: {:.2g} (cumulated periodogram), {:.2g} "
+                          "(Ljung-Box).</p>\n<table>",
+                          r.structure.housing.ratio, r.structure.housing.white_p, r.structure.housing.ljung_box_p);
   s += row({"residual goes with", "correlation", "smoothed over"}, "th");
-  for (const Relation& c : r.structure.relations) s += row({escaped(c.signal), fmt::format("{:+.2f}", c.correlation), c.smoothed_s > 0 ? fmt::format("{:.0f} s", c.smoothed_s) : "–"});
+  for (const Relation& c : r.structure.relations)
+    s += row({escaped(c.signal), fmt::format("{:+.2f}", c.correlation),
+              c.smoothed_s > 0 ? fmt::format("{:.0f} s", c.smoothed_s) : "–"});
   s += "</table>\n<h2>Two-resistor model</h2><table>" + parameter_rows(r.baseline) + "</table>\n<ul>";
   for (const std::string& check : r.checks) s += "<li>" + escaped(check) + "</li>";
   for (const std::string& loose : r.loose) s += "<li class=warn>" + escaped(loose) + "</li>";
-  s += "<li>all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be seen</li></ul>\n";
+  s += "<li>all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain "
+       "cannot be seen</li></ul>\n";
   if (r.experiment) {
-    s += "<h2>Experiment that would tell</h2><p>" + escaped(r.experiment->why) + "</p><table>" + row({"seconds", "current, A", "speed, rad/s"}, "th");
-    for (const ProfileStep& p : r.experiment->profile) s += row({fmt::format("{:.0f}", p.seconds), fmt::format("{:.2f}", p.current_A), fmt::format("{:.1f}", p.speed_rad_per_s)});
+    s += "<h2>Experiment that would tell</h2><p>" + escaped(r.experiment->why) + "</p><table>" +
+         row({"seconds", "current, A", "speed, rad/s"}, "th");
+    for (const ProfileStep& p : r.experiment->profile)
+      s += row({fmt::format("{:.0f}", p.seconds), fmt::format("{:.2f}", p.current_A),
+                fmt::format("{:.1f}", p.speed_rad_per_s)});
     s += "</table>\n";
   }
   if (!r.reasoning.empty()) {

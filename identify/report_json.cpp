@@ -14,7 +14,11 @@ ordered_json number(double v) { return std::isfinite(v) ? ordered_json(v) : orde
 ordered_json parameters(const std::vector<ParameterLine>& lines) {
   ordered_json out = ordered_json::array();
   for (const ParameterLine& p : lines) {
-    out.push_back({{"name", p.name}, {"value", number(p.value)}, {"unit", p.unit}, {"std_error", number(p.std_error)}, {"determined", p.determined},
+    out.push_back({{"name", p.name},
+                   {"value", number(p.value)},
+                   {"unit", p.unit},
+                   {"std_error", number(p.std_error)},
+                   {"determined", p.determined},
                    {"at_bound", p.at_bound}});
   }
   return out;
@@ -22,7 +26,10 @@ ordered_json parameters(const std::vector<ParameterLine>& lines) {
 
 ordered_json rms(const Rmse& r) { return {{"housing", number(r.housing_K)}, {"core", number(r.core_K)}}; }
 
-double worst(const Rmse& r) { return std::isnan(r.core_worst_K) ? r.housing_worst_K : std::max(r.core_worst_K, std::isnan(r.housing_worst_K) ? 0 : r.housing_worst_K); }
+double worst(const Rmse& r) {
+  return std::isnan(r.core_worst_K) ? r.housing_worst_K
+                                    : std::max(r.core_worst_K, std::isnan(r.housing_worst_K) ? 0 : r.housing_worst_K);
+}
 
 }  // namespace
 
@@ -37,15 +44,22 @@ std::string as_json(const Report& r) {
   base["parameters"] = parameters(r.baseline);
   base["rmse_K"] = rms(r.baseline_rmse);
   base["worst_K"] = number(worst(r.baseline_rmse));
-  base["adequacy"] = {{"ratio", number(r.structure.housing.ratio)}, {"white_p", number(r.structure.housing.white_p)},
+  base["adequacy"] = {{"ratio", number(r.structure.housing.ratio)},
+                      {"white_p", number(r.structure.housing.white_p)},
                       {"ljung_box_p", number(r.structure.housing.ljung_box_p)}};
   base["where"] = ordered_json::array();
   for (const Wrong& w : r.structure.wrong) {
-    base["where"].push_back({{"log", w.log}, {"channel", w.channel}, {"from_s", w.from_s}, {"to_s", w.to_s}, {"mean_K", w.mean_K}, {"goes_with", w.goes_with}});
+    base["where"].push_back({{"log", w.log},
+                             {"channel", w.channel},
+                             {"from_s", w.from_s},
+                             {"to_s", w.to_s},
+                             {"mean_K", w.mean_K},
+                             {"goes_with", w.goes_with}});
   }
   base["correlations"] = ordered_json::array();
   for (const Relation& c : r.structure.relations) {
-    base["correlations"].push_back({{"signal", c.signal}, {"correlation", number(c.correlation)}, {"smoothed_s", c.smoothed_s}});
+    base["correlations"].push_back(
+        {{"signal", c.signal}, {"correlation", number(c.correlation)}, {"smoothed_s", c.smoothed_s}});
   }
   base["converged"] = r.converged;
   base["checks"] = r.checks;
@@ -58,22 +72,33 @@ std::string as_json(const Report& r) {
   for (const CauseLine& c : r.causes) {
     ordered_json rivals = ordered_json::array();
     for (const Rival& rival : c.rivals) rivals.push_back({{"id", rival.id}, {"delta_bic", number(rival.delta_bic)}});
-    out["causes"].push_back({{"id", c.id}, {"name", c.name}, {"delta_bic", number(c.delta_bic)}, {"parameters", parameters(c.parameters)}, {"rivals", rivals}});
+    out["causes"].push_back({{"id", c.id},
+                             {"name", c.name},
+                             {"delta_bic", number(c.delta_bic)},
+                             {"parameters", parameters(c.parameters)},
+                             {"rivals", rivals}});
   }
   out["candidates"] = ordered_json::array();
   for (const Rung& rung : r.ladder) {
-    out["candidates"].push_back({{"id", rung.id}, {"gain_bic", number(rung.delta_bic)}, {"chosen", rung.chosen}, {"tied", rung.tied}});
+    out["candidates"].push_back(
+        {{"id", rung.id}, {"gain_bic", number(rung.delta_bic)}, {"chosen", rung.chosen}, {"tied", rung.tied}});
   }
   out["held_out"] = nullptr;
   if (r.held_out) {
-    out["held_out"] = {{"how", r.held_out->how}, {"rmse_before_K", rms(r.held_out->before)}, {"rmse_after_K", rms(r.held_out->after)},
-                       {"worst_before_K", number(worst(r.held_out->before))}, {"worst_after_K", number(worst(r.held_out->after))}};
+    out["held_out"] = {{"how", r.held_out->how},
+                       {"rmse_before_K", rms(r.held_out->before)},
+                       {"rmse_after_K", rms(r.held_out->after)},
+                       {"worst_before_K", number(worst(r.held_out->before))},
+                       {"worst_after_K", number(worst(r.held_out->after))}};
   }
   out["gain"] = nullptr;
   if (r.gain) {
-    out["gain"] = {{"overshoot_before_K", number(r.gain->overshoot_before_K)}, {"overshoot_after_K", number(r.gain->overshoot_after_K)},
-                   {"burst_s_before", number(r.gain->burst_s_before)}, {"burst_s_after", number(r.gain->burst_s_after)},
-                   {"continuous_A_before", number(r.gain->continuous_A_before)}, {"continuous_A_after", number(r.gain->continuous_A_after)}};
+    out["gain"] = {{"overshoot_before_K", number(r.gain->overshoot_before_K)},
+                   {"overshoot_after_K", number(r.gain->overshoot_after_K)},
+                   {"burst_s_before", number(r.gain->burst_s_before)},
+                   {"burst_s_after", number(r.gain->burst_s_after)},
+                   {"continuous_A_before", number(r.gain->continuous_A_before)},
+                   {"continuous_A_after", number(r.gain->continuous_A_after)}};
   }
   out["experiment"] = nullptr;
   if (r.experiment) {

@@ -11,13 +11,17 @@ namespace {
 
 std::string line_of(const ParameterLine& p) {
   return fmt::format("  {:<12} {:>10.4g} {:<10} +- {:<9.2g} {}\n", p.name, p.value, p.unit, p.std_error,
-                     p.at_bound ? "AT ITS BOUND" : p.determined ? "" : "not determined by this data: the sheet's word");
+                     p.at_bound     ? "AT ITS BOUND"
+                     : p.determined ? ""
+                                    : "not determined by this data: the sheet's word");
 }
 
 std::string rmse(const Rmse& r) {
   std::string out;
-  if (!std::isnan(r.housing_K)) out += fmt::format("housing {:.2f} K rms, {:.1f} K worst", r.housing_K, r.housing_worst_K);
-  if (!std::isnan(r.core_K)) out += fmt::format("{}winding {:.2f} K rms, {:.1f} K worst", out.empty() ? "" : "; ", r.core_K, r.core_worst_K);
+  if (!std::isnan(r.housing_K))
+    out += fmt::format("housing {:.2f} K rms, {:.1f} K worst", r.housing_K, r.housing_worst_K);
+  if (!std::isnan(r.core_K))
+    out += fmt::format("{}winding {:.2f} K rms, {:.1f} K worst", out.empty() ? "" : "; ", r.core_K, r.core_worst_K);
   return out;
 }
 
@@ -30,7 +34,8 @@ std::string as_text(const Report& r, bool explain) {
 
   s += "\nTwo-resistor model, fitted\n";
   for (const ParameterLine& p : r.baseline) s += line_of(p);
-  s += "  all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be seen\n";
+  s += "  all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain "
+       "cannot be seen\n";
   s += "  misses by: " + rmse(r.baseline_rmse) + "\n";
   for (const std::string& check : r.checks) s += "  " + check + "\n";
   for (const std::string& loose : r.loose) s += "    " + loose + "\n";
@@ -41,7 +46,8 @@ std::string as_text(const Report& r, bool explain) {
     for (const Variant& v : r.variants) s += fmt::format("  {:<55} {}\n", v.what, rmse(v.rmse));
     if (r.variants.size() == 2) {
       const Rmse &with = r.variants[0].rmse, &without = r.variants[1].rmse;
-      const double a = std::isnan(with.core_K) ? with.housing_K : with.core_K, b = std::isnan(without.core_K) ? without.housing_K : without.core_K;
+      const double a = std::isnan(with.core_K) ? with.housing_K : with.core_K,
+                   b = std::isnan(without.core_K) ? without.housing_K : without.core_K;
       if (a > 1.15 * b) {
         s += "  The coefficient of copper, which is certain, makes the fit WORSE: without it two errors cancel.\n"
              "  Some heat does not follow the current.\n";
@@ -49,18 +55,21 @@ std::string as_text(const Report& r, bool explain) {
     }
   }
 
-  s += fmt::format("\nWhere it is wrong (residual {:.2f} times the noise; chance of so unwhite a residual from a right model: {:.2g}, {:.2g})\n",
-                   r.structure.housing.ratio, r.structure.housing.white_p, r.structure.housing.ljung_box_p);
+  s += fmt::format(
+      "\nWhere it is wrong (residual {:.2f} times the noise; chance of so unwhite a residual from a right model: "
+      "{:.2g}, {:.2g})\n",
+      r.structure.housing.ratio, r.structure.housing.white_p, r.structure.housing.ljung_box_p);
   if (r.structure.wrong.empty()) s += "  no stretch stands out\n";
   for (const Wrong& w : r.structure.wrong) {
     s += fmt::format("  {}{:.0f}..{:.0f} s: {} is {:.2f} K {} than simulated; goes with {}\n",
-                     r.plots.size() > 1 ? r.plots[static_cast<std::size_t>(w.log)].name + " " : "", w.from_s, w.to_s, w.channel, std::abs(w.mean_K),
-                     w.mean_K > 0 ? "hotter" : "cooler", w.goes_with);
+                     r.plots.size() > 1 ? r.plots[static_cast<std::size_t>(w.log)].name + " " : "", w.from_s, w.to_s,
+                     w.channel, std::abs(w.mean_K), w.mean_K > 0 ? "hotter" : "cooler", w.goes_with);
   }
   s += "  residual goes with:";
   for (std::size_t i = 0; i < std::min<std::size_t>(4, r.structure.relations.size()); ++i) {
     const Relation& relation = r.structure.relations[i];
-    s += fmt::format(" {} {:+.2f}{}", relation.signal, relation.correlation, relation.smoothed_s > 0 ? fmt::format(" (over {:.0f} s)", relation.smoothed_s) : "");
+    s += fmt::format(" {} {:+.2f}{}", relation.signal, relation.correlation,
+                     relation.smoothed_s > 0 ? fmt::format(" (over {:.0f} s)", relation.smoothed_s) : "");
     if (i + 1 < std::min<std::size_t>(4, r.structure.relations.size())) s += ",";
   }
   s += "\n";
@@ -68,7 +77,11 @@ std::string as_text(const Report& r, bool explain) {
   if (!r.ladder.empty()) {
     s += "\nCandidates (evidence gained over the two-resistor model; 10 are asked for)\n";
     for (const Rung& rung : r.ladder) {
-      s += fmt::format("  {} {:<22} {:>9.1f}  {}\n", rung.chosen ? "=>" : rung.tied ? " ~" : "  ", rung.id, rung.delta_bic, rung.name);
+      s += fmt::format("  {} {:<22} {:>9.1f}  {}\n",
+                       rung.chosen ? "=>"
+                       : rung.tied ? " ~"
+                                   : "  ",
+                       rung.id, rung.delta_bic, rung.name);
     }
   }
   for (const CauseLine& c : r.causes) {
@@ -84,12 +97,16 @@ std::string as_text(const Report& r, bool explain) {
     if (!r.causes.empty()) s += "  after:  " + rmse(r.held_out->after) + "\n";
   }
   if (r.gain) {
-    s += fmt::format("\nWhat it is worth\n  overshoot of the winding {:.1f} -> {:.1f} K; burst {:.1f} -> {:.1f} s; continuous {:.2f} -> {:.2f} A\n", r.gain->overshoot_before_K,
-                     r.gain->overshoot_after_K, r.gain->burst_s_before, r.gain->burst_s_after, r.gain->continuous_A_before, r.gain->continuous_A_after);
+    s += fmt::format(
+        "\nWhat it is worth\n  overshoot of the winding {:.1f} -> {:.1f} K; burst {:.1f} -> {:.1f} s; continuous "
+        "{:.2f} -> {:.2f} A\n",
+        r.gain->overshoot_before_K, r.gain->overshoot_after_K, r.gain->burst_s_before, r.gain->burst_s_after,
+        r.gain->continuous_A_before, r.gain->continuous_A_after);
   }
   if (r.experiment) {
     s += "\nExperiment that would tell\n  " + r.experiment->why + "\n";
-    for (const ProfileStep& p : r.experiment->profile) s += fmt::format("  {:>6.0f} s  {:>7.2f} A  {:>8.1f} rad/s\n", p.seconds, p.current_A, p.speed_rad_per_s);
+    for (const ProfileStep& p : r.experiment->profile)
+      s += fmt::format("  {:>6.0f} s  {:>7.2f} A  {:>8.1f} rad/s\n", p.seconds, p.current_A, p.speed_rad_per_s);
   }
   if (explain) {
     s += "\nHow this was found\n";

@@ -15,11 +15,12 @@ struct Signal {
   std::function<double(const Bin&)> of;
 };
 
-double d(const Bin& b, Drive drive) { return b.drive[static_cast<int>(drive)]; }
+double d(const Bin& b, Drive drive) { return b.input[drive]; }
 
 std::vector<Signal> signals(const Problem& problem) {
   std::vector<Signal> s;
-  if (problem.heated_by_power()) s.push_back({"power", [](const Bin& b) { return d(b, Drive::power_W); }});
+  if (problem.heated_by_power())
+    s.push_back({"power", [](const Bin& b) { return d(b, Drive::power_W); }});
   else {
     s.push_back({"current squared", [](const Bin& b) { return d(b, Drive::current_A2); }});
     s.push_back({"size of the current", [](const Bin& b) { return d(b, Drive::current_A); }});
@@ -29,9 +30,13 @@ std::vector<Signal> signals(const Problem& problem) {
     s.push_back({"speed", [](const Bin& b) { return d(b, Drive::speed_rad_per_s); }});
     s.push_back({"speed squared", [](const Bin& b) { return d(b, Drive::speed2_rad2_per_s2); }});
   }
-  s.push_back({"sink temperature", [](const Bin& b) { return b.boundary_degC[0]; }});
-  if (problem.logs.front().has_neighbour) s.push_back({"neighbour's temperature", [](const Bin& b) { return b.boundary_degC[static_cast<int>(thermal::Boundary::neighbour)]; }});
-  if (problem.logs.front().has_frame) s.push_back({"frame temperature", [](const Bin& b) { return b.boundary_degC[static_cast<int>(thermal::Boundary::frame)]; }});
+  s.push_back({"sink temperature", [](const Bin& b) { return b.input.boundary_degC[0]; }});
+  if (problem.logs.front().has_neighbour)
+    s.push_back({"neighbour's temperature",
+                 [](const Bin& b) { return b.input.boundary_degC[static_cast<int>(thermal::Boundary::neighbour)]; }});
+  if (problem.logs.front().has_frame)
+    s.push_back({"frame temperature",
+                 [](const Bin& b) { return b.input.boundary_degC[static_cast<int>(thermal::Boundary::frame)]; }});
   return s;
 }
 
@@ -76,7 +81,9 @@ void find_wrong(const Problem& problem, int l, const char* channel, const std::v
     sum[i + 1] = sum[i] + (std::isnan(residual[i]) ? 0 : residual[i]);
     count[i + 1] = count[i] + (std::isnan(residual[i]) ? 0 : 1);
   }
-  const auto mean = [&](std::size_t from, std::size_t to) { return count[to] > count[from] ? (sum[to] - sum[from]) / (count[to] - count[from]) : 0; };
+  const auto mean = [&](std::size_t from, std::size_t to) {
+    return count[to] > count[from] ? (sum[to] - sum[from]) / (count[to] - count[from]) : 0;
+  };
   int sign = 0;
   std::size_t start = 0;
   for (std::size_t i = 0; i <= n; ++i) {
@@ -84,7 +91,9 @@ void find_wrong(const Problem& problem, int l, const char* channel, const std::v
     const int now = m > noise_K ? 1 : m < -noise_K ? -1 : 0;
     if (now == sign) continue;
     if (sign != 0) {
-      Wrong w{l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s, mean(start, i), ""};
+      Wrong w{
+          l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s, mean(start, i),
+          ""};
       // What is unusual in this stretch: the signal whose mean lies furthest from its mean in the rest of the log.
       double most = 0.3;
       for (const Signal& s : all) {
@@ -94,13 +103,15 @@ void find_wrong(const Problem& problem, int l, const char* channel, const std::v
           (k >= start && k < i ? in : out_) += v;
           square += v * v;
         }
-        const double inside = static_cast<double>(i - start), outside = static_cast<double>(n) - inside, N = static_cast<double>(n);
+        const double inside = static_cast<double>(i - start), outside = static_cast<double>(n) - inside,
+                     N = static_cast<double>(n);
         if (outside < 1 || inside < 1) continue;
         const double sd = std::sqrt(std::max(1e-12, square / N - std::pow((in + out_) / N, 2)));
         const double z = (in / inside - out_ / outside) / sd;
         if (std::abs(z) > most) most = std::abs(z), w.goes_with = std::string(z > 0 ? "high " : "low ") + s.name;
       }
-      if (w.goes_with.empty()) w.goes_with = start < n / 10 ? "the start" : i > n * 9 / 10 ? "the end" : "none of the signals";
+      if (w.goes_with.empty())
+        w.goes_with = start < n / 10 ? "the start" : i > n * 9 / 10 ? "the end" : "none of the signals";
       out.push_back(w);
     }
     sign = now;
@@ -140,7 +151,8 @@ Whiteness whiteness(const std::vector<double>& whitened) {
   for (std::size_t i = 0; i < m * group; ++i) g[i / group] += v[i] - mean;
   double total = 0;
   for (std::size_t f = 1; f <= half; ++f) {
-    const double w = 2 * 3.14159265358979323846 * static_cast<double>(f) / static_cast<double>(m), turn = 2 * std::cos(w);
+    const double w = 2 * 3.14159265358979323846 * static_cast<double>(f) / static_cast<double>(m),
+                 turn = 2 * std::cos(w);
     double s1 = 0, s2 = 0;
     for (const double x : g) {
       const double s = x + turn * s1 - s2;
@@ -171,18 +183,24 @@ Structure structure(const Problem& problem, const Fit& f) {
     whitened.insert(whitened.end(), r.whitened.begin(), r.whitened.end());
     const auto& seen = log.has_housing ? r.housing_residual_K : r.core_residual_K;
     residual.insert(residual.end(), seen.begin(), seen.end());
-    for (std::size_t k = 0; k < log.bins.size(); ++k) rise.push_back(r.housing_degC[k] - log.bins[k].boundary_degC[0]);
+    for (std::size_t k = 0; k < log.bins.size(); ++k)
+      rise.push_back(r.housing_degC[k] - log.bins[k].input.boundary_degC[0]);
     for (std::size_t s = 0; s < all.size(); ++s) {
       std::vector<double> v;
       for (const Bin& b : log.bins) v.push_back(all[s].of(b));
-      const auto append = [](std::vector<double>& to, const std::vector<double>& from) { to.insert(to.end(), from.begin(), from.end()); };
+      const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+        to.insert(to.end(), from.begin(), from.end());
+      };
       append(plain[s], v);
       append(fast[s], smoothed(v, log.width_s / (30 + log.width_s)));
       append(slow[s], smoothed(v, log.width_s / (300 + log.width_s)));
     }
     const double threshold = std::max(0.1, 3 * problem.noise.housing_slow_K);
-    if (log.has_housing) find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, threshold, all, out.wrong);
-    if (log.has_core) find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K, std::max(3 * threshold, 0.7 * problem.noise.core_white_K), all, out.wrong);
+    if (log.has_housing)
+      find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, threshold, all, out.wrong);
+    if (log.has_core)
+      find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K,
+                 std::max(3 * threshold, 0.7 * problem.noise.core_white_K), all, out.wrong);
   }
   if (!problem.logs.front().has_housing) {
     whitened.clear();
@@ -191,14 +209,16 @@ Structure structure(const Problem& problem, const Fit& f) {
   out.housing = whiteness(whitened);
   for (std::size_t s = 0; s < all.size(); ++s) {
     Relation best{all[s].name, 0, 0};
-    for (const auto& [values, tau] : {std::pair(&plain[s], 0.0), std::pair(&fast[s], 30.0), std::pair(&slow[s], 300.0)}) {
+    for (const auto& [values, tau] :
+         {std::pair(&plain[s], 0.0), std::pair(&fast[s], 30.0), std::pair(&slow[s], 300.0)}) {
       const double c = correlation(residual, *values);
       if (std::abs(c) > std::abs(best.correlation)) best = {all[s].name, c, tau};
     }
     out.relations.push_back(best);
   }
   out.relations.push_back({"housing above sink", correlation(residual, rise), 0});
-  std::sort(out.relations.begin(), out.relations.end(), [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+  std::sort(out.relations.begin(), out.relations.end(),
+            [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
   std::sort(out.wrong.begin(), out.wrong.end(), [](const Wrong& a, const Wrong& b) {
     return std::abs(a.mean_K) * (a.to_s - a.from_s) > std::abs(b.mean_K) * (b.to_s - b.from_s);
   });

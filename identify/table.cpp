@@ -67,7 +67,8 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
 bool means_missing(std::string_view s) {
   if (s.empty()) return true;
   std::string low(s.substr(0, 5));
-  std::transform(low.begin(), low.end(), low.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  std::transform(low.begin(), low.end(), low.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   return low == "nan" || low == "na" || low == "n/a" || low == "null" || low == "none" || low == "-" || low == "-nan";
 }
 
@@ -132,7 +133,8 @@ Table read_table(const std::string& path) {
                                static_cast<double>(row.size()) / 1e6));
     }
     row = trimmed(row);
-    if (row.find('\0') != std::string_view::npos) refuse(line, "a zero byte; this is not a text file: export the log as CSV.");
+    if (row.find('\0') != std::string_view::npos)
+      refuse(line, "a zero byte; this is not a text file: export the log as CSV.");
     if (row.empty() || row.front() == '#') continue;
     if (table.names.empty()) {
       separator = separator_of(row);
@@ -140,7 +142,9 @@ Table read_table(const std::string& path) {
       for (const auto cell : cells) table.names.emplace_back(trimmed(cell));
       double unused = 0;
       if (number(cells.front(), separator == ';', unused) && std::isfinite(unused)) {
-        refuse(line, "numbers where the header should be; put a line with column names (such as time_s,current_A,housing_degC) first.");
+        refuse(line,
+               "numbers where the header should be; put a line with column names (such as "
+               "time_s,current_A,housing_degC) first.");
       }
       table.columns.resize(table.names.size());
       continue;
@@ -149,15 +153,17 @@ Table read_table(const std::string& path) {
     const bool whole = split(row, separator, cells);
     if (whole && cells.size() == table.names.size() + 1 && cells.back().empty()) cells.pop_back();
     if (!whole || cells.size() != table.names.size()) {
-      refuse(line, fmt::format("the row has {} of {} cells{}", cells.size(), table.names.size(),
-                               closed ? "; repair or delete this line."
-                                      : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
+      refuse(line,
+             fmt::format(
+                 "the row has {} of {} cells{}", cells.size(), table.names.size(),
+                 closed ? "; repair or delete this line."
+                        : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
     }
     for (std::size_t c = 0; c < cells.size(); ++c) {
       double value = missing;
       if (!number(cells[c], separator == ';', value)) {
-        refuse(line, fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.", shown(cells[c]),
-                                 shown(table.names[c])));
+        refuse(line, fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
+                                 shown(cells[c]), shown(table.names[c])));
       }
       table.columns[c].push_back(value);
     }
@@ -166,7 +172,8 @@ Table read_table(const std::string& path) {
   if (table.names.empty()) {
     throw UserError(Exit::unusable, path + ": the file is empty; record a log with a header line and rows.");
   }
-  if (table.rows() == 0) throw UserError(Exit::unusable, path + ": there is a header and no row; the recording failed: record it again.");
+  if (table.rows() == 0)
+    throw UserError(Exit::unusable, path + ": there is a header and no row; the recording failed: record it again.");
   return table;
 }
 

@@ -20,7 +20,7 @@ struct Table {
   std::vector<int> line;                     // line number of each row, for sentences
 
   std::size_t rows() const { return line.size(); }
-  int find(const std::string& name) const;   // -1: no such column
+  int find(const std::string& name) const;  // -1: no such column
 };
 
 /// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when there is no such file.

@@ -8,8 +8,8 @@
 namespace identify {
 
 struct Unit {
-  std::string quantity;  // "time", "current", "temperature", ...
-  double factor, offset; // SI = factor * (value + offset)
+  std::string quantity;   // "time", "current", "temperature", ...
+  double factor, offset;  // SI = factor * (value + offset)
 };
 
 std::optional<Unit> unit_named(const std::string& unit);
@@ -19,6 +19,7 @@ std::string quantity_of(const std::string& suffix);
 
 /// Sets factor and offset for a column in `unit` that plays `role` (an own name, unit included). Throws UserError
 /// (usage), saying `where`, when the unit is unknown or measures something else.
-void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor, double& offset);
+void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor,
+                double& offset);
 
 }  // namespace identify

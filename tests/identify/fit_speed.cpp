@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Prints how long the four-parameter fit takes on one core (CPU time, after the logs are read): a benchmark, not a
+// test.
+//   build/host/bin/fit_speed
+#include <fmt/format.h>
+
+#include <ctime>
+
+#include "identify/fit.hpp"
+#include "identify/table.hpp"
+#include "tests/identify/bench_log.hpp"
+#include "wire/pc/motor_file.hpp"
+
+namespace {
+
+double cpu_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+void measure(const char* what, double seconds, double rate_Hz, double core_every_s) {
+  tests::BenchOptions options;
+  options.seconds = seconds;
+  options.rate_Hz = rate_Hz;
+  options.core_every_s = core_every_s;
+  const auto motor = wire::pc::read_motor("ec-powermax-30-24v", HOTCORE_SOURCE_DIR "/boards/motors");
+  options.motor = {1.5 * motor.motor.phase_resistance_ohm, 0.00393, 0.18, 6.0, 12.0, 190.0};
+  const auto table = identify::read_table(tests::write_bench_log("hotcore_speed.csv", options));
+  const double t0 = cpu_ms();
+  const auto logs = identify::logs_of(table, {}, motor.motor);
+  const auto problem = identify::problem_of(logs, motor);
+  const double t1 = cpu_ms();
+  const identify::Fit f = identify::fit(problem, {});
+  const double t2 = cpu_ms();
+  fmt::print("{}: fit {:.1f} ms, binning {:.1f} ms ({} rows, {} bins of {:.1f} s, {} iterations, {})\n", what, t2 - t1,
+             t1 - t0, table.rows(), problem.logs[0].bins.size(), problem.logs[0].width_s, f.iterations,
+             f.settled ? "settled" : "NOT settled");
+}
+
+}  // namespace
+
+int main() {
+  measure("30 min at 10 Hz, housing and sparse winding", 1800, 10, 30);
+  measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30);
+}

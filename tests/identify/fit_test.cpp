@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MIT
+#include "identify/fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include "identify/baseline.hpp"
+#include "identify/replay.hpp"
+#include "identify/structure.hpp"
+#include "identify/table.hpp"
+#include "tests/identify/bench_log.hpp"
+
+namespace {
+
+using identify::Chosen;
+using identify::Fit;
+using identify::Problem;
+
+const auto sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+
+Problem problem_from(const tests::BenchOptions& options, bool with_sheet = true,
+                     std::optional<double> copper = std::nullopt) {
+  const std::string name =
+      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
+  const auto logs = identify::logs_of(identify::read_table(tests::write_bench_log(name, options)), {}, std::nullopt);
+  return identify::problem_of(logs, with_sheet ? std::optional(sheet) : std::nullopt, copper);
+}
+
+tests::BenchOptions off_sheet(std::uint64_t seed) {
+  tests::BenchOptions o;
+  o.seed = seed;
+  o.core_every_s = 20;
+  o.core_white_K = 2;
+  o.motor = {0.75, 0.00393, 1.08 * 1.5, 16.3 * 0.7, 1.13 * 0.8, 18.0 * 1.4};
+  return o;
+}
+
+TEST(Dual, DerivativesAreExact) {
+  using D = identify::Dual<2>;
+  const D x = D::variable(1.3, 0), k = D::variable(0.7, 1);
+  const D y = exp(x * k) / (x + 2.0) - pow(x, k) * log(x);
+  const double h = 1e-6;
+  const auto f = [](double a, double b) { return std::exp(a * b) / (a + 2) - std::pow(a, b) * std::log(a); };
+  EXPECT_NEAR(y.v, f(1.3, 0.7), 1e-14);
+  EXPECT_NEAR(y.d[0], (f(1.3 + h, 0.7) - f(1.3 - h, 0.7)) / (2 * h), 1e-8);
+  EXPECT_NEAR(y.d[1], (f(1.3, 0.7 + h) - f(1.3, 0.7 - h)) / (2 * h), 1e-8);
+}
+
+TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
+  tests::BenchOptions options = off_sheet(3);
+  options.seconds = 300;
+  options.rate_Hz = 5;
+  Problem problem = problem_from(options);
+  problem.speed08_mean = 40;  // the speed causes are exercised as well
+  for (auto& bin : problem.logs[0].bins) {
+    const double w = 50 + 40 * std::sin(0.05 * static_cast<double>(&bin - problem.logs[0].bins.data()));
+    bin.input[thermal::Drive::speed_rad_per_s] = w;
+    bin.input[thermal::Drive::speed2_rad2_per_s2] = w * w;
+    bin.input[thermal::Drive::speed_to_0_8] = std::pow(w, 0.8);
+    bin.input[thermal::Drive::current_speed] = w * bin.input[thermal::Drive::current_A];
+    bin.input[thermal::Drive::current2_speed2] = w * w * bin.input[thermal::Drive::current_A2];
+    for (auto& b : bin.input.boundary_degC) b += 5;
+  }
+  for (int d = 0; d < thermal::drive_count; ++d) {
+    problem.drive_mean[d] = 0;
+    for (const auto& bin : problem.logs[0].bins)
+      problem.drive_mean[d] += bin.input.drive[d] / static_cast<double>(problem.logs[0].bins.size());
+  }
+  for (std::size_t c = 0; c < identify::causes().size(); ++c) {
+    const std::vector<Chosen> chosen = {{static_cast<int>(c), 0}};
+    const auto& cause = identify::causes()[c];
+    const auto n = static_cast<Eigen::Index>(identify::base_count + cause.parameters.size() + identify::per_log_count);
+    Eigen::VectorXd x(n), gradient;
+    x.head(4) << std::log(1.4), std::log(13.0), std::log(1.0), std::log(21.0);
+    for (std::size_t p = 0; p < cause.parameters.size(); ++p) {
+      const auto& parameter = cause.parameters[p];
+      x[4 + static_cast<Eigen::Index>(p)] = parameter.logarithmic
+                                                ? std::log(parameter.none != 0 ? parameter.none : 0.3) + 0.2
+                                                : parameter.none + 0.31 * parameter.typical;
+    }
+    x.tail(2) << 24.5, 0.3;
+    ASSERT_LT(identify::cost_at(problem, chosen, x, &gradient), 1e200) << cause.id;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      Eigen::VectorXd up = x, down = x;
+      const double h = 1e-5;
+      up[i] += h;
+      down[i] -= h;
+      const double difference =
+          (identify::cost_at(problem, chosen, up) - identify::cost_at(problem, chosen, down)) / (2 * h);
+      // A delay's slope is that of a line between bins, a difference across a bin's edge is not: looser there.
+      const double loose = cause.edit == identify::Edit::delay ? 0.05 : 1e-5;
+      EXPECT_NEAR(gradient[i], difference, loose * (std::abs(difference) + gradient.norm() * 1e-3) + 1e-4)
+          << cause.id << " coordinate " << i;
+    }
+  }
+}
+
+TEST(Fit, RecoversParametersWithinItsStatedErrors) {
+  const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
+  int inside = 0, all = 0;
+  double square = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Problem problem = problem_from(off_sheet(seed));
+    const Fit f = identify::fit(problem, {});
+    EXPECT_TRUE(f.settled) << seed;
+    const Eigen::VectorXd sd = f.std_errors();
+    for (int i = 0; i < 4; ++i) {
+      const double z = (f.x[i] - truth[i]) / sd[i];
+      EXPECT_LT(std::abs(f.x[i] - truth[i]), 0.35) << "seed " << seed << " parameter " << i;
+      inside += std::abs(z) < 2;
+      square += z * z;
+      ++all;
+    }
+  }
+  // 95 % are expected inside two standard errors; of 48, fewer than 41 happen once in 200 runs of a right program.
+  EXPECT_GE(inside, 41) << "of " << all;
+  EXPECT_LT(square / all, 2.0);
+  EXPECT_GT(square / all, 0.3) << "errors stated far too large";
+}
+
+TEST(Fit, StatedErrorsThatAreTooSmallWouldBeSeen) {
+  // The check above must be able to fail: with a noise model ten times too quiet it does.
+  int inside = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Problem problem = problem_from(off_sheet(seed));
+    problem.noise.housing_white_K /= 10;
+    problem.noise.housing_slow_K /= 10;
+    problem.noise.core_white_K /= 10;
+    const Fit f = identify::fit(problem, {});
+    const Eigen::VectorXd sd = f.std_errors();
+    const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
+    for (int i = 0; i < 4; ++i) inside += std::abs(f.x[i] - truth[i]) < 2 * sd[i];
+  }
+  EXPECT_LT(inside, 17);
+}
+
+TEST(Fit, WithTheTrueModelTheResidualIsWhite) {
+  int white = 0;
+  for (std::uint64_t seed = 1; seed <= 11; ++seed) {
+    const Problem problem = problem_from(off_sheet(seed));
+    const auto s = identify::structure(problem, identify::fit(problem, {}));
+    EXPECT_NEAR(s.housing.ratio, 1, 0.15) << seed;
+    white += s.housing.white_p > 0.001;
+  }
+  // The noise model comes from a few minutes of rest and is not exact; the test for whiteness is sharper than that.
+  EXPECT_GE(white, 8);
+}
+
+TEST(Fit, WithHiddenHeatTheResidualIsNotWhiteAndTheStretchIsFound) {
+  tests::BenchOptions options = off_sheet(5);
+  options.extra_housing_W = [](double t, double, double) { return t > 400 && t < 600 ? 3.0 : 0.0; };
+  const Problem problem = problem_from(options);
+  const auto s = identify::structure(problem, identify::fit(problem, {}));
+  EXPECT_GT(s.housing.ratio, 1.5);
+  EXPECT_LT(s.housing.white_p, 1e-6);
+  ASSERT_FALSE(s.wrong.empty());
+  const auto hit = std::any_of(s.wrong.begin(), s.wrong.end(),
+                               [](const auto& w) { return w.mean_K > 0 && w.from_s < 600 && w.to_s > 450; });
+  EXPECT_TRUE(hit);
+}
+
+TEST(Fit, AnUnknownMotorIsFoundFromTheDataAlone) {
+  const Problem problem = problem_from(off_sheet(2), false);
+  const Fit f = identify::fit(problem, {});
+  // Resistance was taken as 1 instead of 0.75 ohm: R comes out times 0.75, C divided by it.
+  EXPECT_NEAR(f.x[0], std::log(1.08 * 1.5 * 0.75), 0.35);
+  EXPECT_NEAR(f.x[1], std::log(16.3 * 0.7 * 0.75), 0.15);
+  EXPECT_NEAR(f.x[3], std::log(18.0 * 1.4 / 0.75), 0.25);
+}
+
+TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
+  tests::BenchOptions cold = off_sheet(7), warm = off_sheet(8);
+  warm.start_degC = 60;
+  auto logs =
+      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_cold.csv", cold)), {}, std::nullopt);
+  logs.push_back(
+      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_warm.csv", warm)), {}, std::nullopt)[0]);
+  const Problem problem = identify::problem_of(logs, sheet);
+  const Fit f = identify::fit(problem, {});
+  ASSERT_EQ(f.x.size(), 8);
+  EXPECT_NEAR(f.x[4], 24, 1);
+  EXPECT_NEAR(f.x[6], 60, 1);
+  const Fit one = identify::fit(identify::problem_of({logs[0]}, sheet), {});
+  EXPECT_LT(f.std_errors()[1], one.std_errors()[1]);
+}
+
+TEST(Refusal, HousingAloneWithConstantResistanceGivesNoCoreTemperature) {
+  tests::BenchOptions options = off_sheet(4);
+  options.core_every_s = 0;
+  options.power_gain = 1;
+  options.motor.copper = 0;
+  const Problem problem = problem_from(options);
+  const Fit f = identify::fit(problem, {});
+  EXPECT_NE(identify::core_refusal(problem, f).find("No winding temperature is stated"), std::string::npos);
+  EXPECT_GT(identify::sd_from_data(f, 0), 1) << "the data must not claim to know R1";
+}
+
+TEST(Refusal, ACoreReadingOrCoppersCoefficientLiftsIt) {
+  tests::BenchOptions options = off_sheet(4);
+  const Problem with_core = problem_from(options);
+  EXPECT_TRUE(identify::core_refusal(with_core, identify::fit(with_core, {})).empty());
+}
+
+TEST(Replay, IrregularSamplesGiveTheSameParameters) {
+  tests::BenchOptions options = off_sheet(6);
+  const std::string path = tests::write_bench_log("hotcore_regular.csv", options);
+  const auto whole = identify::logs_of(identify::read_table(path), {}, std::nullopt);
+  identify::Log thinned = whole[0];
+  std::mt19937_64 random(11);
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < thinned.of(identify::Role::time).size(); ++i) {
+    if (random() % 4 != 0) kept.push_back(i);
+  }
+  for (auto& column : thinned.columns) {
+    if (column.empty()) continue;
+    std::vector<double> next;
+    for (const std::size_t i : kept) next.push_back(column[i]);
+    column = next;
+  }
+  const Fit a = identify::fit(identify::problem_of(whole, sheet), {}),
+            b = identify::fit(identify::problem_of({thinned}, sheet), {});
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(a.x[i], b.x[i], 3 * b.std_errors()[i]);
+}
+
+}  // namespace

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include "identify/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "identify/discover.hpp"
+#include "identify/table.hpp"
+#include "tests/identify/bench_log.hpp"
+
+namespace {
+
+using nlohmann::json;
+
+identify::Report report_of(const tests::BenchOptions& options, const identify::HoldOut& held = {}) {
+  const std::string name =
+      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
+  const auto logs = identify::logs_of(identify::read_table(tests::write_bench_log(name, options)), {}, std::nullopt);
+  return identify::discover(logs, wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"), held);
+}
+
+struct Outcome {
+  int code;
+  std::string out;
+};
+
+Outcome run(const std::string& arguments) {
+  const std::string out = (std::filesystem::temp_directory_path() / "hotcore_identify_out").string();
+  const int status = std::system((std::string(IDENTIFY_PROGRAM) + " " + arguments + " > '" + out + "' 2>&1").c_str());
+  std::ostringstream text;
+  text << std::ifstream(out).rdbuf();
+  return {WEXITSTATUS(status), text.str()};
+}
+
+const std::string data = HOTCORE_SOURCE_DIR "/../shared/data/";
+const std::string maps = HOTCORE_SOURCE_DIR "/identify/maps/";
+
+TEST(Report, JsonHoldsTheFieldsOfTheContract) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seconds = 600;
+  identify::HoldOut held;
+  held.fraction = 0.3;
+  const json j = json::parse(identify::as_json(report_of(options, held)));
+  EXPECT_EQ(j.at("format"), 1);
+  for (const char* key : {"verdict", "sentence", "baseline", "causes", "held_out", "gain", "experiment", "model_file"})
+    EXPECT_TRUE(j.contains(key)) << key;
+  ASSERT_EQ(j.at("baseline").at("parameters").size(), 4u);
+  for (const auto& p : j["baseline"]["parameters"]) {
+    for (const char* key : {"name", "value", "unit", "std_error", "determined"}) EXPECT_TRUE(p.contains(key)) << key;
+  }
+  EXPECT_TRUE(j["baseline"]["rmse_K"]["housing"].is_number());
+  EXPECT_TRUE(j["baseline"]["rmse_K"]["core"].is_number());
+  EXPECT_TRUE(j["baseline"]["adequacy"]["ratio"].is_number());
+  EXPECT_TRUE(j["baseline"]["adequacy"]["white_p"].is_number());
+  EXPECT_TRUE(j["baseline"]["where"].is_array());
+  for (const char* key : {"how", "rmse_before_K", "rmse_after_K", "worst_before_K", "worst_after_K"})
+    EXPECT_TRUE(j["held_out"].contains(key)) << key;
+}
+
+TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seconds = 600;
+  EXPECT_TRUE(report_of(options).converged);
+  options.extra_housing_W = [](double t, double, double) { return t > 200 && t < 350 ? 4.0 : 0.0; };
+  EXPECT_FALSE(report_of(options).converged) << "the residual check";
+  tests::BenchOptions poor;
+  poor.seconds = 60;
+  EXPECT_FALSE(report_of(poor).converged) << "the identifiability check";
+}
+
+TEST(Report, ThePageIsOneFileAndEscapesWhatItShows) {
+  tests::BenchOptions options;
+  options.seconds = 300;
+  identify::Report report = report_of(options);
+  report.notes.push_back("<script>alert(1)</script>");
+  const std::string html = identify::as_html(report);
+  EXPECT_NE(html.find("<svg"), std::string::npos);
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+  EXPECT_EQ(html.find("src="), std::string::npos);
+  EXPECT_EQ(html.find("<link"), std::string::npos);
+}
+
+TEST(Program, UnknownMotorIsAnsweredWithTheNearest) {
+  tests::BenchOptions options;
+  options.seconds = 60;
+  const Outcome r = run(tests::write_bench_log("hotcore_motor.csv", options) + " --motor ec-16-40W");
+  EXPECT_EQ(r.code, 2);
+  EXPECT_NE(r.out.find("did you mean 'ec-16-40w'?"), std::string::npos) << r.out;
+}
+
+TEST(Program, BadDataEndsWithThreeAndWritesNothing) {
+  const std::string path = (std::filesystem::temp_directory_path() / "hotcore_bad.csv").string(),
+                    json_path = path + ".json";
+  std::filesystem::remove(json_path);
+  std::ofstream(path) << "time_s,current_A,housing_degC\n0,1\n";
+  const Outcome r = run(path + " --json " + json_path);
+  EXPECT_EQ(r.code, 3);
+  EXPECT_EQ(std::count(r.out.begin(), r.out.end(), '\n'), 1) << r.out;
+  EXPECT_FALSE(std::filesystem::exists(json_path));
+}
+
+TEST(Program, AWrongOptionIsUsage) {
+  EXPECT_EQ(run("--nonsense").code, 2);
+  EXPECT_EQ(run("").code, 2);
+  EXPECT_EQ(run("--help").code, 0);
+}
+
+TEST(Program, ALogWithoutLoadCannotBeUsed) {
+  tests::BenchOptions options;
+  options.seconds = 120;
+  options.current_A = [](double, std::mt19937_64&) { return 0.0; };
+  const Outcome r = run(tests::write_bench_log("hotcore_idle.csv", options));
+  EXPECT_EQ(r.code, 3);
+  EXPECT_NE(r.out.find("no current and no power flows"), std::string::npos) << r.out;
+}
+
+TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const Outcome r = run(data + "tass_run1.csv " + data + "tass_run3.csv --hold-out " + data +
+                        "tass_run4_fan.csv --map " + maps + "tass.toml --json -");
+  ASSERT_EQ(r.code, 0) << r.out;
+  const json j = json::parse(r.out);
+  EXPECT_GT(j["held_out"]["rmse_before_K"]["core"], 20);
+  EXPECT_GT(j["held_out"]["rmse_before_K"]["housing"], 20);
+  EXPECT_GT(j["held_out"]["worst_before_K"], 50);
+  EXPECT_LT(j["baseline"]["rmse_K"]["core"], 6);
+}
+
+TEST(MeasuredData, CoppersCoefficientMakesPaderbornWorse) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const Outcome r = run(data + "paderborn_groupA.csv --map " + maps + "paderborn.toml --json -");
+  ASSERT_EQ(r.code, 0) << r.out;
+  const json j = json::parse(r.out);
+  ASSERT_EQ(j["baseline"]["variants"].size(), 2u);
+  EXPECT_GT(j["baseline"]["variants"][0]["rmse_K"]["core"].get<double>(),
+            1.2 * j["baseline"]["variants"][1]["rmse_K"]["core"].get<double>());
+  EXPECT_FALSE(j["baseline"]["converged"].get<bool>());
+  bool frozen = false;
+  for (const auto& note : j["notes"]) frozen = frozen || note.get<std::string>().find("frozen") != std::string::npos;
+  EXPECT_TRUE(frozen);
+}
+
+}  // namespace
