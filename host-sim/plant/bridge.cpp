@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: MIT
+#include "host-sim/plant/bridge.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace host_sim {
+
+/// The flux error of each phase is piecewise linear over half a period (000, one upper, two uppers, 111), starts and
+/// ends at zero and is antisymmetric in the other half; a segment from a to b contributes (a^2 + ab + b^2)/3 of its
+/// length.
+std::array<double, 3> ripple_share(const std::array<double, 3>& ratio) {
+  int high = 0, low = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (ratio[k] > ratio[high]) high = k;
+    if (ratio[k] <= ratio[low]) low = k;
+  }
+  const int middle = 3 - high - low;
+  const double mean = (ratio[0] + ratio[1] + ratio[2]) / 3;
+  if (high == low) return {0, 0, 0};
+  const double t0 = 0.5 * (1 - ratio[high]), t1 = 0.5 * (ratio[high] - ratio[middle]),
+               t2 = 0.5 * (ratio[middle] - ratio[low]), t3 = 0.5 * ratio[low];
+  std::array<double, 3> share;
+  for (int k = 0; k < 3; ++k) {
+    const double error = ratio[k] - mean;
+    const double a = -error * t0;
+    const double b = a + ((k == high ? 2.0 / 3 : -1.0 / 3) - error) * t1;
+    const double c = b + ((k == low ? -2.0 / 3 : 1.0 / 3) - error) * t2;
+    share[k] = (2.0 / 3) * (t0 * a * a + t1 * (a * a + a * b + b * b) + t2 * (b * b + b * c + c * c) + t3 * c * c);
+  }
+  return share;
+}
+
+void Bridge::advance(Motor& motor, const hal::Duty& duty, double bus_V, const std::array<double, 3>& winding_ohm) {
+  const double period_s = 1 / design_.pwm_Hz;
+  short_A_ = 0;
+  if (!duty.on) {
+    const std::array<double, 3> emf_V = motor.back_emf_V();
+    const double swing_V = std::max({emf_V[0], emf_V[1], emf_V[2]}) - std::min({emf_V[0], emf_V[1], emf_V[2]});
+    if (motor.current_squared_A2() == 0 && swing_V < bus_V) {
+      motor.step(period_s, {0, 0, 0}, 7, false);  // at rest or slow: no diode can open
+      return;
+    }
+    for (int part = 0; part < 8; ++part) segment(motor, period_s / 8, {Gate::off, Gate::off, Gate::off}, bus_V);
+    return;
+  }
+  const std::array<double, 3> ratio = {std::clamp(static_cast<double>(duty.ratio.a), 0.0, 1.0),
+                                       std::clamp(static_cast<double>(duty.ratio.b), 0.0, 1.0),
+                                       std::clamp(static_cast<double>(duty.ratio.c), 0.0, 1.0)};
+  if (design_.switched) {
+    switched(motor, ratio, bus_V);
+  } else {
+    averaged(motor, ratio, bus_V, winding_ohm);
+  }
+  charge_edges(motor, ratio, bus_V);
+  if (short_from >= 0) carry_short(ratio, bus_V);
+}
+
+void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
+                      const std::array<double, 3>& winding_ohm) {
+  const double period_s = 1 / design_.pwm_Hz;
+  const double dead = design_.dead_time_s * design_.pwm_Hz;
+  const std::array<double, 3> current_A = motor.current_A();
+  std::array<double, 3> effective, drop_V, terminal_V;
+  for (int k = 0; k < 3; ++k) {
+    effective[k] = ratio[k];
+    drop_V[k] = 0;
+    if (ratio[k] > 0 && ratio[k] < 1) {  // no edges, no dead time
+      const double sign = std::clamp(current_A[k] / soft_A_, -1.0, 1.0);
+      effective[k] = std::clamp(ratio[k] - dead * sign, 0.0, 1.0);
+      drop_V[k] = design_.diode_V * 2 * dead * sign;
+    }
+    terminal_V[k] = effective[k] * bus_V - drop_V[k];
+  }
+  motor.step(period_s, terminal_V, open_phases, true);
+
+  const std::array<double, 3> mean_A = motor.mean_current_A();
+  for (int k = 0; k < 3; ++k) {
+    work_.bus_J += period_s * mean_A[k] * effective[k] * bus_V;
+    work_.heat_J += period_s * mean_A[k] * drop_V[k];
+  }
+  if (open_phases != 0) return;
+  const double unit_A = bus_V * period_s / std::sqrt(motor.design().inductance_d_H * motor.design().inductance_q_H);
+  const std::array<double, 3> share = ripple_share(ratio);
+  double squared_A2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double ripple_A2 = share[k] * unit_A * unit_A;
+    squared_A2 += ripple_A2;
+    const double heat_J = ripple_A2 * winding_ohm[k] * period_s,
+                 series_J = ripple_A2 * design_.on_resistance_ohm * period_s;
+    work_.ripple_A2s[k] += ripple_A2 * period_s;
+    work_.ripple_J[k] += heat_J;
+    work_.ripple_series_J += series_J;
+    work_.bus_J += heat_J + series_J;
+  }
+  soft_A_ = 1e-3 + std::sqrt(squared_A2);  // peak of a triangle: sqrt(3) of its rms; squared_A2 sums three phases
+}
+
+void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V) {
+  const double period_s = 1 / design_.pwm_Hz;
+  std::array<double, 24> edge_s;
+  int edges = 0;
+  for (int part = 1; part <= 8; ++part) edge_s[edges++] = period_s * part / 8;  // keeps long segments accurate
+  std::array<double, 3> rise_s, fall_s;
+  for (int k = 0; k < 3; ++k) {
+    rise_s[k] = 0.5 * (1 - ratio[k]) * period_s;
+    fall_s[k] = 0.5 * (1 + ratio[k]) * period_s;
+    if (ratio[k] <= 0 || ratio[k] >= 1) continue;
+    for (const double at_s : {rise_s[k], rise_s[k] + design_.dead_time_s, fall_s[k], fall_s[k] + design_.dead_time_s}) {
+      if (at_s < period_s) edge_s[edges++] = at_s;
+    }
+  }
+  std::sort(edge_s.begin(), edge_s.begin() + edges);
+  double now_s = 0;
+  for (int e = 0; e < edges; ++e) {
+    const double h_s = edge_s[e] - now_s;
+    if (h_s < 1e-12) continue;
+    const double middle_s = now_s + 0.5 * h_s;
+    std::array<Gate, 3> gates;
+    for (int k = 0; k < 3; ++k) {
+      if (open_phases >> k & 1) {
+        gates[k] = Gate::off;
+      } else if (ratio[k] <= 0 ||
+                 (ratio[k] < 1 && (middle_s < rise_s[k] || middle_s > fall_s[k] + design_.dead_time_s))) {
+        gates[k] = Gate::lower;
+      } else if (ratio[k] >= 1 || (middle_s > rise_s[k] + design_.dead_time_s && middle_s < fall_s[k])) {
+        gates[k] = Gate::upper;
+      } else {
+        gates[k] = Gate::off;
+      }
+    }
+    segment(motor, h_s, gates, bus_V);
+    now_s = edge_s[e];
+  }
+}
+
+/// A stretch with constant gates. Where both switches of a phase are off its current chooses the diode; a diode whose
+/// current reaches zero stops, and a floating lead that leaves the rails starts one.
+void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V) {
+  double left_s = h_s;
+  for (int split = 0; split < 7 && left_s > 0; ++split) {  // each phase can stop and start a diode once; then go on
+    const std::array<double, 3> current_A = motor.current_A();
+    std::array<double, 3> terminal_V{};
+    std::array<bool, 3> at_upper{};
+    std::array<int, 3> diode{};  // +1 upper, -1 lower, 0 none
+    unsigned open = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (open_phases >> k & 1) {
+        open |= 1u << k;
+      } else if (gates[k] != Gate::off) {
+        at_upper[k] = gates[k] == Gate::upper;
+        terminal_V[k] = at_upper[k] ? bus_V : 0;
+      } else if (std::fabs(current_A[k]) > 1e-9) {
+        diode[k] = current_A[k] > 0 ? -1 : 1;
+      } else {
+        open |= 1u << k;
+      }
+    }
+    const auto close = [&](int k, int which) {
+      diode[k] = which;
+      open &= ~(1u << k);
+    };
+    const auto settle = [&] {
+      for (int k = 0; k < 3; ++k) {
+        if (diode[k] == 0) continue;
+        at_upper[k] = diode[k] > 0;
+        terminal_V[k] = diode[k] > 0 ? bus_V + design_.diode_V : -design_.diode_V;
+      }
+    };
+    settle();
+    if (open != 0) {
+      const std::array<double, 3> emf_V = motor.back_emf_V();
+      double star_V = 0;
+      int closed = 0;
+      for (int k = 0; k < 3; ++k) {
+        if (open >> k & 1) continue;
+        star_V += terminal_V[k] - emf_V[k];
+        ++closed;
+      }
+      if (closed == 0) {
+        const auto highest = static_cast<int>(std::max_element(emf_V.begin(), emf_V.end()) - emf_V.begin());
+        const auto lowest = static_cast<int>(std::min_element(emf_V.begin(), emf_V.end()) - emf_V.begin());
+        const bool can = !((open_phases >> highest & 1) || (open_phases >> lowest & 1));
+        if (can && emf_V[highest] - emf_V[lowest] > bus_V + 2 * design_.diode_V) {
+          close(highest, 1);
+          close(lowest, -1);
+        }
+      } else {
+        star_V /= closed;
+        for (int k = 0; k < 3; ++k) {
+          if (!(open >> k & 1) || (open_phases >> k & 1)) continue;
+          const double lead_V = star_V + emf_V[k];
+          if (lead_V > bus_V + design_.diode_V) close(k, 1);
+          if (lead_V < -design_.diode_V) close(k, -1);
+        }
+      }
+      settle();
+    }
+
+    const Motor::Snapshot before = motor.save();
+    double step_s = left_s;
+    motor.step(step_s, terminal_V, open, false);
+    // The first diode whose current would turn round ends this split there.
+    const std::array<double, 3> after_A = motor.current_A();
+    int stopped = -1;
+    double share = 1;
+    for (int k = 0; k < 3; ++k) {
+      if (diode[k] == 0 || after_A[k] * diode[k] <= 0) continue;  // still flows its way
+      const double here = std::fabs(current_A[k]) <= 1e-9 ? 0 : current_A[k] / (current_A[k] - after_A[k]);
+      if (here < share) {
+        share = here;
+        stopped = k;
+      }
+    }
+    if (stopped >= 0) {
+      motor.restore(before);
+      step_s = std::max(share * left_s, 1e-12);
+      motor.step(step_s, terminal_V, open, false);
+    }
+    const std::array<double, 3> mean_A = motor.mean_current_A();
+    for (int k = 0; k < 3; ++k) {
+      if (open >> k & 1) continue;
+      if (at_upper[k]) work_.bus_J += step_s * bus_V * mean_A[k];
+      if (diode[k] != 0) work_.heat_J -= step_s * design_.diode_V * diode[k] * mean_A[k];
+    }
+    if (stopped >= 0) motor.extinguish(stopped);
+    left_s -= step_s;
+    if (left_s < 1e-12) break;
+  }
+}
+
+/// Overlap of voltage and current at the edges.
+void Bridge::charge_edges(const Motor& motor, const std::array<double, 3>& ratio, double bus_V) {
+  const std::array<double, 3> current_A = motor.current_A();
+  for (int k = 0; k < 3; ++k) {
+    if (ratio[k] <= 0 || ratio[k] >= 1 || (open_phases >> k & 1)) continue;
+    const double loss_J = bus_V * std::fabs(current_A[k]) * design_.overlap_s;
+    work_.heat_J += loss_J;
+    work_.bus_J += loss_J;
+  }
+}
+
+void Bridge::carry_short(const std::array<double, 3>& ratio, double bus_V) {
+  const double across_V = (ratio[short_from] - ratio[short_to]) * bus_V;
+  short_A_ = across_V / short_ohm;
+  const double loss_J = across_V * short_A_ / design_.pwm_Hz;
+  work_.short_J += loss_J;
+  work_.bus_J += loss_J;
+}
+
+}  // namespace host_sim

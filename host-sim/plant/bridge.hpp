@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// A three-phase bridge made of numbers, one axis. In: duties and bus voltage for one PWM period; it drives the motor
+// and says what it took from the bus and what became heat in it. Two faithfulnesses:
+//   averaged: one motor step a period; dead time as a voltage error by current sign, ripple heat in closed form
+//   switched: every edge, dead time with the diodes that really conduct, real ripple
+// Centre-aligned: a period begins and ends in the middle of the zero vector with all lower switches on, which is where
+// currents are sampled. Released (all six switches open) both modes follow the diodes.
+#pragma once
+
+#include <array>
+
+#include "hal/axis_port.hpp"
+#include "host-sim/plant/motor.hpp"
+
+namespace host_sim {
+
+/// Defaults: a small MOSFET stage of the 20 A class; assumptions of ours, not a measured board.
+struct BridgeDesign {
+  double pwm_Hz = 20000;
+  double dead_time_s = 500e-9;
+  double on_resistance_ohm = 0.01;  // one switch, shunt and copper of one phase
+  double diode_V = 0.8;
+  double overlap_s = 20e-9;  // voltage times current overlap of one on and one off edge together
+  bool switched = false;
+};
+
+/// Joules since construction. Out of the bus = into the motor + heat + ripple + short.
+struct BridgeWork {
+  double bus_J = 0;
+  double heat_J = 0;                   // switches and diodes; the resistive part is the motor's series_J
+  std::array<double, 3> ripple_J{};    // averaged bridge: copper heat of the ripple that the motor did not see
+  std::array<double, 3> ripple_A2s{};  // the same as integral of squared current
+  double ripple_series_J = 0;          // ripple in the on-resistance
+  double short_J = 0;                  // in a shorted pair of leads
+};
+
+/// Mean square of each phase's ripple current over a PWM period, in units of (bus voltage * period / inductance)^2.
+std::array<double, 3> ripple_share(const std::array<double, 3>& ratio);
+
+class Bridge {
+ public:
+  explicit Bridge(const BridgeDesign& design) : design_(design) {}
+
+  /// One PWM period.
+  void advance(Motor& motor, const hal::Duty& duty, double bus_V, const std::array<double, 3>& winding_ohm);
+
+  // Faults of the wiring and of the stage; neutral by default.
+  unsigned open_phases = 0;            // bit k: lead or both switches of phase k open
+  int short_from = -1, short_to = -1;  // pair of leads that touch
+  double short_ohm = 0.05;
+
+  const BridgeWork& work() const { return work_; }
+  const BridgeDesign& design() const { return design_; }
+  /// Current through the short that the current sensors see besides the motor's.
+  double short_A() const { return short_A_; }
+
+ private:
+  enum class Gate { upper, lower, off };
+  void averaged(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
+                const std::array<double, 3>& winding_ohm);
+  void switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V);
+  void segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V);
+  void charge_edges(const Motor& motor, const std::array<double, 3>& ratio, double bus_V);
+  void carry_short(const std::array<double, 3>& ratio, double bus_V);
+
+  BridgeDesign design_;
+  BridgeWork work_;
+  double soft_A_ = 1e-3;  // below this current the ripple crosses zero and the dead time errs less
+  double short_A_ = 0;
+};
+
+}  // namespace host_sim
