@@ -18,15 +18,18 @@ constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
 
 constexpr int window_steps = 50;     // the housing is heard twice a second: faster only averages its noise
 constexpr int missing_steps = 10;    // 100 ms without a reading: safety table, NTC open or short
-constexpr float most_pull_K = 5.0f;  // safety table: the estimate never falls further by the sensor
-constexpr float pull_forgotten_K_per_s = 5.0f / 1200.0f;
+constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
+constexpr float suspicious_pull_K = 1.0f;
+constexpr float least_gate_K = 5.0f;
+constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;
 constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
-constexpr float enough_movement_K = 2.0f, alive_share = 0.4f;
+constexpr float enough_movement_K = 3.0f, alive_share = 0.5f, stuck_share = 0.25f;
 constexpr float start_sigma_K = 15.0f;
 constexpr float restored_hotter_K = 10.0f;
 
-// Drift of the ambient: 2 K in an hour. Of any node: 0.1 K in a second's square root, what no parameter explains.
-constexpr float ambient_walk_K2_per_s = 4.0f / 3600.0f, node_walk_K2_per_s = 1e-2f;
+// Drift of the ambient: 10 K in 20 min, at most 10 K off while it is observed; it also takes up cooling that differs
+// from the sheet's. Of any node: 0.1 K in a second's square root, what no parameter explains.
+constexpr float ambient_walk_K2_per_s = 100.0f / 1200.0f, ambient_worst_K = 10.0f, node_walk_K2_per_s = 1e-2f;
 
 float squared(float x) { return x * x; }
 
@@ -161,7 +164,8 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   const Covariance fp = f.lazyProduct(p_);
   p_ = fp.lazyProduct(f.transpose());
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
-  p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
+  if (acquired_ && p_(ambient(), ambient()) < squared(ambient_worst_K))
+    p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
   if (ambient_known_) {
     p_.row(ambient()).setZero();
     p_.col(ambient()).setZero();
@@ -219,29 +223,40 @@ void CoreEstimator::correct_by_housing(float innovation_K) {
   const float noise = squared(settings_.housing_noise_K);
   if (!acquired_) {
     acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity());
+    trusted_ambient_degC_ = ambient_degC_;
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + noise);
-  const float gate_K = 4.0f * sigma_K > most_pull_K ? 4.0f * sigma_K : most_pull_K;
-  bool believed = innovation_K > -gate_K;
-  if (believed && pulled_K_ >= most_pull_K) {
-    // The budget is used up. A sensor that moved with the load has earned a new one; one that stood still has not.
-    const float expected = std::abs(model_moved_K_);
-    const float moved = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
-    if (expected >= enough_movement_K && moved >= alive_share * expected) pulled_K_ = 0.0f;
-    if (innovation_K < 0.0f && pulled_K_ >= most_pull_K) believed = innovation_K > -sigma_K;
+  const float gate_K = 4.0f * sigma_K > least_gate_K ? 4.0f * sigma_K : least_gate_K;
+  // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
+  const float expected_K = std::abs(model_moved_K_);
+  const float moved_K = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
+  const bool tested = expected_K >= enough_movement_K;
+  if (tested && moved_K >= alive_share * expected_K) {
+    pulled_K_ = 0.0f;
+    trusted_ambient_degC_ = ambient_degC_;
   }
-  if (!believed) {
-    if (!(flags_ & housing_contradicts)) {
-      p_(housing_.node, housing_.node) += squared(3.0f);
-      p_(ambient(), ambient()) += squared(3.0f);
-    }
-    flags_ |= housing_contradicts;
+  const bool stuck = tested && moved_K < stuck_share * expected_K && pulled_K_ > suspicious_pull_K;
+  const bool colder = innovation_K < -(sigma_K < least_gate_K ? sigma_K : least_gate_K) && pulled_K_ >= most_pull_K;
+  if (!(innovation_K > -gate_K) || (innovation_K < 0.0f && (stuck || colder))) {
+    disbelieve_housing();
     return;
   }
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   const float left_K = most_pull_K - pulled_K_;
   correct(seen, innovation_K, noise, left_K > 0.0f ? left_K : 0.0f);
+}
+
+/// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
+void CoreEstimator::disbelieve_housing() {
+  if (!(flags_ & housing_contradicts)) {
+    for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(pulled_K_);
+    sensor_degC_ += static_cast<double>(pulled_K_);
+    if (trusted_ambient_degC_ > ambient_degC_) ambient_degC_ = trusted_ambient_degC_;
+    p_(housing_.node, housing_.node) += squared(3.0f);
+    p_(ambient(), ambient()) += squared(3.0f);
+  }
+  flags_ |= housing_contradicts;
 }
 
 /// How far a correction lowers the winding, K; negative if it raises all of them.
@@ -282,31 +297,34 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
 
 void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC,
                                         float copper_coefficient_per_K) {
-  flags_ |= winding_ohm_refused;
   const float ohm_per_K = ohm_at_25_degC * copper_coefficient_per_K;
-  if (!(ohm > 0.0f) || !(sigma_ohm > 0.0f) || !(ohm_per_K > 0.0f)) return;
-  const float seen_degC = 25.0f + (ohm - ohm_at_25_degC) / ohm_per_K;
-  Row seen = Row::Zero(n_ + 5);
-  int windings = 0;
-  for (int i = 0; i < n_; ++i) windings += std::isfinite(max_degC_[i]) ? 1 : 0;
-  if (windings == 0 || !plausible(static_cast<double>(seen_degC))) return;
-  double mean_degC = 0.0;
-  for (int i = 0; i < n_; ++i) {
-    if (!std::isfinite(max_degC_[i])) continue;
-    seen[i] = 1.0f / static_cast<float>(windings);
-    mean_degC += degC_[i] / windings;
-  }
-  const float variance_K2 = squared(sigma_ohm / ohm_per_K);
-  const float expected_K = std::sqrt(seen.dot(p_.lazyProduct(seen)) + variance_K2);
-  float innovation_K = seen_degC - static_cast<float>(mean_degC);
-  const float gate_K = 4.0f * expected_K;
-  if (!(innovation_K > -gate_K)) return;
-  if (innovation_K > gate_K) innovation_K = gate_K;  // hotter than believable still counts, but one reading is only one
-  if (correct(seen, innovation_K, variance_K2, std::numeric_limits<float>::infinity())) {
-    flags_ &= ~static_cast<std::uint32_t>(winding_ohm_refused);
-  }
+  const bool usable = ohm > 0.0f && sigma_ohm > 0.0f && ohm_per_K > 0.0f;
+  const float seen_degC = usable ? 25.0f + (ohm - ohm_at_25_degC) / ohm_per_K : std::numeric_limits<float>::quiet_NaN();
+  flags_ |= winding_ohm_refused;
+  if (hear_winding(seen_degC, sigma_ohm / ohm_per_K)) flags_ &= ~static_cast<std::uint32_t>(winding_ohm_refused);
   guard_state();
   publish();
+}
+
+/// A mean winding temperature seen with a known error; false if it cannot be or is colder than four sigmas.
+bool CoreEstimator::hear_winding(float seen_degC, float sigma_K) {
+  if (!plausible(static_cast<double>(seen_degC)) || !(sigma_K > 0.0f)) return false;
+  int windings = 0;
+  double sum_degC = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    if (!std::isfinite(max_degC_[i])) continue;
+    ++windings;
+    sum_degC += degC_[i];
+  }
+  if (windings == 0) return false;
+  Row seen = Row::Zero(n_ + 5);
+  for (int i = 0; i < n_; ++i) seen[i] = std::isfinite(max_degC_[i]) ? 1.0f / static_cast<float>(windings) : 0.0f;
+  const float gate_K = 4.0f * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(sigma_K));
+  const float innovation_K = seen_degC - static_cast<float>(sum_degC / windings);
+  if (!(innovation_K > -gate_K)) return false;
+  // Hotter than believable still counts, but one reading is only one.
+  return correct(seen, innovation_K < gate_K ? innovation_K : gate_K, squared(sigma_K),
+                 std::numeric_limits<float>::infinity());
 }
 
 void CoreEstimator::raise_to(float winding_degC) {

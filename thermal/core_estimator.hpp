@@ -106,6 +106,8 @@ class CoreEstimator {
   void propagate_covariance(const HeatNetwork<double>::Rates& rates);
   void hear_housing(Reading housing);
   void correct_by_housing(float innovation_K);
+  void disbelieve_housing();
+  bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K);
   float down_by(const Row& gain, float innovation_K) const;
   void guard_state();
@@ -131,8 +133,9 @@ class CoreEstimator {
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;
   int heard_ = 0, window_ = 0, silent_ = 0;
   bool acquired_ = false, ambient_known_ = false;
-  float pulled_K_ = 0.0f;       // how far it has pulled the winding down lately
-  float model_moved_K_ = 0.0f;  // how far the model says the housing moved in about two minutes,
+  double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
+  float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
+  float model_moved_K_ = 0.0f;         // how far the model says the housing moved in about two minutes,
   float reading_slow_degC_ = 0.0f, reading_moved_K_ = 0.0f;  // and how far the reading did
   float last_sensor_degC_ = 0.0f;
 

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/thermal/reference.hpp"
+#include "thermal/core_estimator.hpp"
+#include "thermal/motor_set.hpp"
+
+namespace {
+
+using thermal::Boundary;
+using thermal::CoreEstimator;
+using thermal::Drive;
+using thermal::EstimatorSettings;
+using thermal::HeatInput;
+using thermal::Reading;
+
+const Reading missing{0.0f, false};
+const Reading at_25{25.0f, true};
+const double nan = std::nan("");
+
+EstimatorSettings with(thermal::Trust trust) {
+  EstimatorSettings s;
+  s.trust = trust;
+  return s;
+}
+
+HeatInput<> current(double i2_A2) {
+  HeatInput<> input;
+  input[Drive::current_A2] = i2_A2;
+  for (Drive phase : {Drive::phase_a_A2, Drive::phase_b_A2, Drive::phase_c_A2}) input[phase] = i2_A2 / 2;
+  return input;
+}
+
+/// Motor, housing sensor and estimator side by side; the sensor may be made to lie.
+struct Bench {
+  wire::Motor m;
+  CoreEstimator core;
+  reference::TwoNodes plant;
+  double ambient_degC;
+  std::mt19937 seed{3};
+  std::normal_distribution<double> noise{0.0, 0.1};
+
+  Bench(const wire::Motor& real, const EstimatorSettings& s, double ambient, const wire::Motor& sheet)
+      : m(real), core(thermal::three_phase_set(sheet), s), plant{real}, ambient_degC(ambient) {
+    plant.degC = {static_cast<reference::Real>(ambient), static_cast<reference::Real>(ambient)};
+  }
+  Bench(const wire::Motor& real, const EstimatorSettings& s, double ambient) : Bench(real, s, ambient, real) {}
+
+  Reading honest() { return {static_cast<float>(static_cast<double>(plant.degC[1]) + noise(seed)), true}; }
+
+  template <class Sensor>
+  void run(double seconds, double i2_A2, Sensor sensor) {
+    for (int i = 0; i < static_cast<int>(seconds * 100 + 0.5); ++i) {
+      plant.advance(0.01L, 1, static_cast<reference::Real>(i2_A2), static_cast<reference::Real>(ambient_degC));
+      core.tick(current(i2_A2), sensor());
+    }
+  }
+  void run(double seconds, double i2_A2) {
+    run(seconds, i2_A2, [&] { return honest(); });
+  }
+  double core_error_K() const { return core.estimate().hottest_degC() - static_cast<double>(plant.degC[0]); }
+  float sigma_K() const { return core.estimate().sigma_K[0]; }
+  bool flag(thermal::EstimateFlag f) const { return (core.estimate().flags & f) != 0; }
+};
+
+TEST(Estimator, FollowsLongDoubleThrough24HoursOfRoughLoad) {
+  const wire::Motor m = [] {
+    wire::Motor motor = reference::ec16();
+    motor.phase_coupling_W_per_K = 0.2;
+    return motor;
+  }();
+#ifdef HOTCORE_TRAP_FLOATS
+  const double hours = 1;
+#else
+  const double hours = 24;
+#endif
+  CoreEstimator core(thermal::three_phase_set(m), with(thermal::exact_trust));
+  reference::ThreePhases truth{m, {40, 40, 40, 40}};
+  std::mt19937 seed(20261121);
+  std::uniform_real_distribution<double> draw(0, 1);
+  double worst_K = 0, hottest_degC = 0;
+  std::array<reference::Real, 3> A2{};
+  HeatInput<> input;
+  int left = 0;
+  for (long tick = 0; tick < static_cast<long>(hours * 360000); ++tick) {
+    if (left-- == 0) {
+      const double kind = draw(seed);
+      const double amplitude_A = kind < 0.1 ? 10 + 10 * draw(seed) : kind < 0.4 ? 0 : 3 * draw(seed);
+      left = static_cast<int>(kind < 0.1 ? 3 + 12 * draw(seed) : 10 + 3000 * draw(seed) * draw(seed));
+      const double angle = 6.2831853 * draw(seed);
+      const bool standing = draw(seed) < 0.5;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double c = std::cos(angle - 2.0943951023931953 * static_cast<double>(k));
+        A2[k] = static_cast<reference::Real>(amplitude_A * amplitude_A * (standing ? c * c : 0.5));
+        input.drive[static_cast<std::size_t>(Drive::phase_a_A2) + k] = static_cast<double>(A2[k]);
+      }
+    }
+    truth.advance(0.01L, 1, A2, 40);
+    const auto& now = core.tick(input, missing, {40.0f, true});
+    for (int k = 0; k < 4; ++k) {
+      worst_K = std::max(worst_K, std::abs(now.degC[k] - static_cast<double>(truth.degC[static_cast<std::size_t>(k)])));
+    }
+    hottest_degC = std::max(hottest_degC, static_cast<double>(truth.hottest_degC()));
+  }
+  std::printf("  %g h of rough load: worst error %.5f K, hottest %.0f degC\n", hours, worst_K, hottest_degC);
+  EXPECT_LE(worst_K, 0.1);
+  EXPECT_GT(hottest_degC, 120.0) << "the load was not rough";
+}
+
+TEST(Estimator, AFloatStepAtThePwmRateWouldReadKelvinsTooCold) {
+  const wire::Motor m = reference::powermax();
+  reference::TwoNodes truth{m};
+  const float dt = 1.0f / 20000.0f, r = static_cast<float>(1.5 * m.phase_resistance_ohm);
+  const float R1 = static_cast<float>(m.R1_K_per_W), R2 = static_cast<float>(m.R2_K_per_W);
+  const float C1 = static_cast<float>(m.C1_J_per_K), C2 = static_cast<float>(m.C2_J_per_K);
+  float T1 = 25, T2 = 25;
+  CoreEstimator core(thermal::two_resistor_set(m), with(thermal::exact_trust));
+  for (int i = 0; i < 50; ++i) core.tick({}, at_25, at_25);
+  for (int tick = 0; tick < 240000; ++tick) {  // 40 minutes near the continuous limit
+    truth.advance(0.01L, 1, 125, 25);
+    core.tick(current(125), missing, at_25);
+    for (int i = 0; i < 200; ++i) {
+      const float heat = r * 125.0f * (1.0f + 0.00393f * (T1 - 25.0f)), across = (T1 - T2) / R1;
+      T1 += dt * (heat - across) / C1;
+      T2 += dt * (across - (T2 - 25.0f) / R2) / C2;
+    }
+  }
+  const double true_degC = static_cast<double>(truth.degC[0]);
+  EXPECT_NEAR(core.estimate().degC[0], true_degC, 0.01);
+  EXPECT_LT(static_cast<double>(T1), true_degC - 5.0) << "the mutant must fail, or this load proves nothing";
+}
+
+TEST(Estimator, FindsAnAmbientItWasNotTold) {
+  for (double ambient : {10.0, 25.0, 55.0}) {
+    Bench bench(reference::ec16(), with(thermal::identified_trust), ambient);
+    bench.run(900, 4);
+    EXPECT_NEAR(bench.core_error_K(), 0.0, 2.5) << ambient;
+    EXPECT_NEAR(bench.core.estimate().ambient_degC, ambient, 6.0);
+    EXPECT_FALSE(bench.flag(thermal::housing_contradicts));
+  }
+}
+
+TEST(Estimator, SigmaGrowsWithLoadAndCoversASheetThatIsWrong) {
+  Bench idle(reference::ec16(), with(thermal::sheet_trust), 25),
+      loaded(reference::ec16(), with(thermal::sheet_trust), 25);
+  idle.run(10, 0);
+  loaded.run(10, 0);
+  loaded.run(0.3, 400);
+  const float rise_K = static_cast<float>(loaded.plant.degC[0]) - 25;
+  EXPECT_GT(loaded.sigma_K(), 0.1f * rise_K);
+  EXPECT_LT(loaded.sigma_K(), 0.3f * rise_K);
+  EXPECT_LT(idle.sigma_K(), 3.0f);
+  Bench exact(reference::ec16(), with(thermal::exact_trust), 25);
+  exact.run(10, 0);
+  exact.run(0.3, 400);
+  EXPECT_LT(exact.sigma_K(), 2.0f);
+
+  for (double scale : {0.75, 1.3}) {  // winding to housing resistance of the real motor against its sheet
+    wire::Motor real = reference::ec16();
+    real.R1_K_per_W *= scale;
+    Bench bench(real, with(thermal::sheet_trust), 25, reference::ec16());
+    bench.run(600, 4);
+    EXPECT_LE(static_cast<double>(bench.plant.degC[0]),
+              static_cast<double>(bench.core.estimate().hottest_margin_degC()));
+  }
+}
+
+TEST(Estimator, CoolingThatDiffersFromTheSheetIsTakenUpOrReadsHotNeverCold) {
+  for (double scale : {0.7, 1.3}) {
+    wire::Motor real = reference::ec16();
+    real.R2_K_per_W *= scale;
+    Bench bench(real, with(thermal::sheet_trust), 25, reference::ec16());
+    double coldest_K = 0, hottest_K = 0;
+    for (int minute = 0; minute < 40; ++minute) {
+      bench.run(60, minute % 20 < 15 ? 5 : 0);
+      coldest_K = std::min(coldest_K, bench.core_error_K());
+      hottest_K = std::max(hottest_K, bench.core_error_K());
+    }
+    EXPECT_GT(coldest_K, -1.0) << scale;
+    EXPECT_LT(hottest_K, 25.0) << scale;
+    EXPECT_NEAR(bench.core_error_K(), 0.0, 1.0) << scale;
+  }
+}
+
+TEST(Estimator, AMissingHousingIsFlaggedInATenthOfASecondAndNeverReadsAsCold) {
+  for (Reading lie : {missing, Reading{-273.0f, true}, Reading{300.0f, true}, Reading{std::nanf(""), true}}) {
+    Bench honest(reference::ec16(), with(thermal::sheet_trust), 25),
+        blind(reference::ec16(), with(thermal::sheet_trust), 25);
+    for (Bench* b : {&honest, &blind}) b->run(120, 5);
+    const float before_K = blind.core.estimate().sigma_K[3];
+    const double before_degC = blind.core.estimate().hottest_degC();
+    blind.run(0.1, 5, [&] { return lie; });
+    EXPECT_TRUE(blind.flag(thermal::housing_missing));
+    EXPECT_GT(blind.core.estimate().sigma_K[3], before_K + 1.0f);
+    blind.run(120, 5, [&] { return lie; });
+    honest.run(120.1, 5);
+    EXPECT_GE(blind.core.estimate().hottest_margin_degC(), honest.core.estimate().hottest_margin_degC());
+    EXPECT_GT(blind.core.estimate().hottest_degC(), before_degC);
+    blind.run(1, 5);
+    EXPECT_FALSE(blind.flag(thermal::housing_missing));
+  }
+}
+
+TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIsFlagged) {
+  for (const wire::Motor& m : {reference::ec16(), reference::powermax()}) {
+    const double i2 = m.R1_K_per_W > 0.5 ? 5.0 : 110.0;
+    for (int kind = 0; kind < 3; ++kind) {
+      Bench blind(m, with(thermal::sheet_trust), 25), lied(m, with(thermal::sheet_trust), 25);
+      for (Bench* b : {&blind, &lied}) b->run(60, i2 / 4);
+      const double stuck = static_cast<double>(lied.plant.degC[1]);
+      double detached = stuck, worst_K = 0, flagged_s = -1;
+      for (int s = 0; s < 400; ++s) {
+        blind.run(1, i2, [] { return missing; });
+        lied.run(1, i2, [&] {
+          detached += (25 - detached) * 0.01 / 20;
+          const double value = kind == 0 ? stuck : kind == 1 ? stuck + lied.noise(lied.seed) : detached;
+          return Reading{static_cast<float>(value), true};
+        });
+        worst_K = std::max(worst_K, blind.core.estimate().hottest_degC() - lied.core.estimate().hottest_degC());
+        if (flagged_s < 0 && lied.flag(thermal::housing_contradicts)) flagged_s = s + 1;
+      }
+      std::printf("  sensor lie %d: %.2f K below the blind estimate, flagged after %.0f s of load\n", kind, worst_K,
+                  flagged_s);
+      EXPECT_LE(worst_K, 5.0);
+      EXPECT_GT(flagged_s, 0);
+      EXPECT_LE(flagged_s, 120);
+    }
+  }
+}
+
+TEST(Estimator, AHotReadingAlwaysRaises) {
+  Bench bench(reference::ec16(), with(thermal::identified_trust), 25);
+  bench.run(60, 2);
+  const double before = bench.core.estimate().hottest_degC();
+  bench.run(30, 2, [&] { return Reading{static_cast<float>(bench.plant.degC[1]) + 30.0f, true}; });
+  EXPECT_GT(bench.core.estimate().hottest_degC(), before + 15);
+}
+
+TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
+  for (double bad : {nan, std::numeric_limits<double>::infinity(), -1.0}) {
+    CoreEstimator good(thermal::three_phase_set(reference::ec16()), {}), spoiled = good;
+    for (int i = 0; i < 100; ++i) good.tick(current(5), missing), spoiled.tick(current(5), missing);
+    HeatInput<> input = current(5);
+    input[Drive::phase_b_A2] = bad;
+    good.tick(current(5), missing);
+    const auto& now = spoiled.tick(input, missing);
+    EXPECT_TRUE(now.flags & thermal::input_replaced);
+    EXPECT_GT(now.degC[1], good.estimate().degC[1] + 1.0);
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE(std::isfinite(now.degC[i]));
+  }
+}
+
+TEST(Estimator, LostTimeIsChargedAtTheLastInput) {
+  CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
+  for (int i = 0; i < 10; ++i) {
+    whole.tick(current(100), missing), gap.tick(current(100), missing), idle_gap.tick(current(100), missing);
+  }
+  for (int i = 0; i < 6; ++i) whole.tick(current(100), missing);
+  whole.tick(current(0), missing);
+  EXPECT_TRUE(gap.tick(current(0), missing, missing, 6).flags & thermal::lost_time);
+  idle_gap.tick(current(0), missing);
+  EXPECT_NEAR(gap.estimate().hottest_degC(), whole.estimate().hottest_degC(), 1e-9);
+  EXPECT_GT(gap.estimate().hottest_degC(), idle_gap.estimate().hottest_degC() + 2);
+}
+
+TEST(Estimator, AStateThatIsNotANumberComesBackHotterAndAllowsNothingMeanwhile) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  for (int i = 0; i < 100; ++i) core.tick(current(50), missing);
+  const double before = core.estimate().hottest_degC();
+  // The state is private: a bit that flips in it is played by an absurd but finite power, which drives it out of all
+  // bounds.
+  HeatInput<> absurd = current(50);
+  absurd[Drive::power_W] = 1e7;
+  const auto& broken = core.tick(absurd, missing);
+  EXPECT_TRUE(broken.flags & thermal::state_restored);
+  EXPECT_EQ(broken.hottest_margin_degC(), std::numeric_limits<float>::infinity());
+  EXPECT_GE(broken.hottest_degC(), before + 9.9);
+  const auto& next = core.tick(current(50), missing);
+  EXPECT_FALSE(next.flags & thermal::state_restored);
+  EXPECT_TRUE(std::isfinite(next.hottest_margin_degC()));
+}
+
+TEST(Estimator, TheHostMayOnlyRaise) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  core.raise_to(90);
+  EXPECT_EQ(core.estimate().hottest_degC(), 90.0);
+  for (float lower : {20.0f, std::nanf(""), -1e9f, 1e9f, -std::numeric_limits<float>::infinity()}) {
+    core.raise_to(lower);
+    EXPECT_EQ(core.estimate().hottest_degC(), 90.0);
+  }
+}
+
+TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
+  const auto set = thermal::three_phase_set(reference::ec16());
+  CoreEstimator before(set, {});
+  for (int i = 0; i < 6000; ++i) before.tick(current(5), missing);
+  float rise_K[thermal::max_nodes];
+  before.save(rise_K);
+  auto after = [&](double off_s) {
+    CoreEstimator core(set, {});
+    core.restore(rise_K, off_s);
+    return core.estimate().hottest_degC();
+  };
+  EXPECT_NEAR(after(nan), before.estimate().hottest_degC(), 1e-4);
+  EXPECT_NEAR(after(-1), before.estimate().hottest_degC(), 1e-4);
+  EXPECT_LT(after(1.0), before.estimate().hottest_degC() - 1);
+  EXPECT_GT(after(1.0), before.estimate().housing_degC);
+  EXPECT_NEAR(after(1e5), 40.0, 0.01);
+  rise_K[0] = std::nanf("");
+  EXPECT_NEAR(after(nan), 155.0, 1e-3) << "a torn record counts as a motor at its limit";
+}
+
+TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
+  const auto set = thermal::three_phase_set(reference::ec16());
+  float rise_K[thermal::max_nodes] = {80, 80, 80, 60};
+  CoreEstimator core(set, {});
+  core.restore(rise_K, nan);
+  EXPECT_NEAR(core.estimate().hottest_degC(), 120.0, 1e-6);
+  for (int i = 0; i < 60; ++i) core.tick({}, at_25);
+  EXPECT_GT(core.estimate().hottest_degC(), 50.0) << "the winding itself is not seen by the housing";
+  for (int i = 0; i < 1000; ++i) core.tick({}, at_25);
+  EXPECT_NEAR(core.estimate().hottest_degC(), 25.0, 5.0) << "what the winding held went into the housing: 95 K C1 / C2";
+}
+
+TEST(Estimator, WindingResistanceCorrectsAndAnImplausibleOneIsRefused) {
+  const auto m = reference::ec16();
+  CoreEstimator core(thermal::three_phase_set(m), {});
+  for (int i = 0; i < 30; ++i) core.tick(current(300), missing);
+  const double believed = core.estimate().hottest_degC();
+  const float r25 = static_cast<float>(m.phase_resistance_ohm), a = 0.00393f;
+  auto ohm_at = [&](double degC) { return r25 * (1 + a * static_cast<float>(degC - 25)); };
+  CoreEstimator colder = core, hotter = core, absurd = core;
+  colder.observe_winding_ohm(ohm_at(believed - 10), r25 * a * 2, r25, a);
+  EXPECT_NEAR(colder.estimate().hottest_degC(), believed - 10, 3.0);
+  EXPECT_LT(colder.estimate().sigma_K[0], core.estimate().sigma_K[0] / 2);
+  hotter.observe_winding_ohm(ohm_at(believed + 300), r25 * a * 2, r25, a);
+  EXPECT_GT(hotter.estimate().hottest_degC(), believed + 20);
+  for (float ohm : {ohm_at(-100), 0.0f, -1.0f, std::nanf("")}) {
+    absurd.observe_winding_ohm(ohm, r25 * a * 2, r25, a);
+    EXPECT_TRUE(absurd.estimate().flags & thermal::winding_ohm_refused) << ohm;
+    EXPECT_EQ(absurd.estimate().hottest_degC(), believed);
+  }
+}
+
+TEST(Estimator, WithoutAnySensorTheAmbientIsBelievedHot) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  for (int i = 0; i < 100000; ++i) core.tick({}, missing);
+  EXPECT_NEAR(core.estimate().hottest_degC(), 40.0, 1e-6);
+  EXPECT_TRUE(core.estimate().flags & thermal::housing_missing);
+}
+
+}  // namespace

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include "thermal/look_ahead.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace thermal {
+
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+/// The drives of a future step: speeds and powers go on as they are, everything that follows current is replaced.
+HeatInput<> future_input(const CoreEstimator& core, float current_A, const PhaseShares& shares) {
+  HeatInput<> input = core.input();
+  const double i_A = static_cast<double>(current_A), i_A2 = i_A * i_A;
+  for (int k = 0; k < 3; ++k) {
+    input[static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k)] = i_A2 * static_cast<double>(shares.k[k]);
+  }
+  input[Drive::current_A2] = i_A2;
+  input[Drive::current_A] = i_A;
+  input[Drive::current2_speed2] = i_A2 * input[Drive::speed2_rad2_per_s2];
+  input[Drive::current_speed] = i_A * input[Drive::speed_rad_per_s];
+  input[Drive::power_W] = 0.0;  // bus power and ripple of the past say nothing about the next motion
+  return input;
+}
+
+}  // namespace
+
+LookAhead::LookAhead(const HeatNetwork<double>& network)
+    : fine_(network.transition(0.01)), middle_(network.transition(0.1)), coarse_(network.transition(5.0)) {}
+
+LookAhead::Run LookAhead::begin(const CoreEstimator& core, double rest_s) const {
+  const Estimate& now = core.estimate();
+  Run run;
+  run.degC.resize(now.node_count);
+  for (int i = 0; i < now.node_count; ++i) {
+    run.degC[i] = std::isfinite(now.max_degC[i]) ? static_cast<double>(now.margin_degC[i]) : now.degC[i];
+  }
+  if (rest_s > 0.0) {
+    run.degC = core.network().step(core.network().transition(rest_s), run.degC,
+                                   future_input(core, 0.0f, {{0.0f, 0.0f, 0.0f}}));
+  }
+  run.forecast = {true, -infinity, infinity};
+  float least_room_K = infinity;
+  for (int i = 0; i < now.node_count; ++i) {
+    const float degC = static_cast<float>(run.degC[i]), room_K = now.max_degC[i] - degC;
+    if (!std::isfinite(now.max_degC[i])) continue;
+    if (!(room_K >= least_room_K)) least_room_K = room_K, run.forecast.peak_degC = degC;
+    if (!(room_K >= 0.0f)) run.forecast.feasible = false, run.forecast.limits_after_s = 0.0f;
+  }
+  return run;
+}
+
+/// Plays one piece; false when there is no more sense in going on (limit passed, or too long to look at).
+bool LookAhead::advance(Run& run, const CoreEstimator& core, const Piece& piece, const PhaseShares& shares) const {
+  const Estimate& now = core.estimate();
+  const HeatInput<> input = future_input(core, piece.current_A, shares);
+  double done_s = 0.0;
+  const double whole_s = static_cast<double>(piece.seconds);
+  while (done_s < whole_s) {
+    if (++run.steps > most_steps) {
+      run.forecast.feasible = false;
+      run.forecast.limits_after_s = static_cast<float>(run.time_s);
+      return false;
+    }
+    const double left_s = whole_s - done_s;
+    const Transition<double>& t = done_s < 1.0 || left_s < 0.1    ? fine_
+                                  : done_s < 20.0 || left_s < 5.0 ? middle_
+                                                                  : coarse_;
+    const Vector next = core.network().step(t, run.degC, input);
+    const double part = left_s < t.dt_s ? left_s / t.dt_s : 1.0;  // of the last step: a straight line within 10 ms
+    for (int i = 0; i < now.node_count; ++i) {
+      if (!std::isfinite(now.max_degC[i])) continue;
+      const double before = run.degC[i], after = before + part * (next[i] - before),
+                   limit = static_cast<double>(now.max_degC[i]);
+      if (!(after <= static_cast<double>(run.forecast.peak_degC))) run.forecast.peak_degC = static_cast<float>(after);
+      if (after <= limit) continue;
+      const double within = after > before ? (limit - before) / (after - before) : 0.0;
+      const float at_s = static_cast<float>(run.time_s + part * t.dt_s * (within > 0.0 ? within : 0.0));
+      if (!(at_s >= run.forecast.limits_after_s)) run.forecast.limits_after_s = at_s;
+      run.forecast.feasible = false;
+    }
+    run.degC += part * (next - run.degC);
+    run.time_s += part * t.dt_s;
+    done_s += part * t.dt_s;
+    if (part < 1.0) break;
+  }
+  return true;
+}
+
+Forecast LookAhead::play_after(double rest_s, const CoreEstimator& core, const Piece* pieces, int count,
+                               const PhaseShares& shares) const {
+  Run run = begin(core, rest_s);
+  for (int i = 0; i < count; ++i) {
+    const Piece& piece = pieces[i];
+    const bool usable = piece.seconds >= 0.0f && piece.seconds < 1e6f && std::abs(piece.current_A) < 1e4f;
+    if (!usable) {
+      run.forecast.feasible = false;
+      if (!(run.forecast.limits_after_s <= static_cast<float>(run.time_s)))
+        run.forecast.limits_after_s = static_cast<float>(run.time_s);
+      break;
+    }
+    if (!advance(run, core, piece, shares)) break;
+  }
+  return run.forecast;
+}
+
+Forecast LookAhead::play(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) const {
+  return play_after(0.0, core, pieces, count, shares);
+}
+
+float LookAhead::wait_s(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) const {
+  const auto fits = [&](double rest_s) { return play_after(rest_s, core, pieces, count, shares).feasible; };
+  if (fits(0.0)) return 0.0f;
+  double enough_s = 0.01;
+  while (!fits(enough_s)) {
+    enough_s *= 2.0;
+    if (!(enough_s < 4.0 * 3600.0)) return infinity;
+  }
+  double short_s = enough_s > 0.01 ? 0.5 * enough_s : 0.0;
+  for (int i = 0; i < 7; ++i) {
+    const double middle_s = 0.5 * (short_s + enough_s);
+    (fits(middle_s) ? enough_s : short_s) = middle_s;
+  }
+  return static_cast<float>(enough_s);
+}
+
+float LookAhead::seconds_left(const CoreEstimator& core, float current_A, const PhaseShares& shares) const {
+  const Piece hour{3600.0f, current_A};
+  return play(core, &hour, 1, shares).limits_after_s;
+}
+
+float LookAhead::current_for_A(const CoreEstimator& core, float seconds, float max_A, const PhaseShares& shares) const {
+  const auto fits = [&](float current_A) {
+    const Piece piece{seconds, current_A};
+    return play(core, &piece, 1, shares).feasible;
+  };
+  if (fits(max_A)) return max_A;
+  float good_A = 0.0f, bad_A = max_A;
+  for (int i = 0; i < 10; ++i) {  // to a thousandth of max_A, always on the safe side
+    const float middle_A = 0.5f * (good_A + bad_A);
+    (fits(middle_A) ? good_A : bad_A) = middle_A;
+  }
+  return good_A;
+}
+
+}  // namespace thermal

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Answers before the motion: can this be done, how hot does it get, when would the governor hold it back, how long to
+// wait for it, how long does the present current last. The same network and the same step as the estimator's.
+//
+//   in   temperatures now (with margin, from the estimator), pieces of (seconds, amperes), boundary temperatures
+//   out  peak temperature of any node that has a limit, the moment it would be reached
+//
+// Steps of 10 ms in the first second of a piece, 0.1 s to 20 s, 5 s beyond; at most most_steps a run: every call is
+// bounded. On the board for the main loop (milliseconds at 168 MHz), not for a lane. Knows no slopes: it asks whether
+// the demand itself fits, not what the governor would make of it.
+#pragma once
+
+#include "thermal/core_estimator.hpp"
+#include "thermal/governor.hpp"
+
+namespace thermal {
+
+/// A piece of a motion: |i| for some time. How it lies on the phases is said beside it (1/2 each when rotating).
+struct Piece {
+  float seconds;
+  float current_A;
+};
+
+struct Forecast {
+  bool feasible;         // no limit is passed, and the whole profile was looked at
+  float peak_degC;       // of the node that comes closest to its limit
+  float limits_after_s;  // +infinity when feasible
+};
+
+class LookAhead {
+ public:
+  explicit LookAhead(const HeatNetwork<double>& network);
+
+  /// Plays the profile from the estimator's present state. At most `count` pieces; unusable pieces are not feasible.
+  Forecast play(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) const;
+
+  /// How long to rest (no current) until the profile fits, s, found to 1 %; +infinity if not within four hours.
+  float wait_s(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) const;
+
+  /// How long a current may go on, s, up to an hour; +infinity beyond.
+  float seconds_left(const CoreEstimator& core, float current_A, const PhaseShares& shares) const;
+
+  /// Largest |i| that may go on for this long, A, up to max_A.
+  float current_for_A(const CoreEstimator& core, float seconds, float max_A, const PhaseShares& shares) const;
+
+ private:
+  using Vector = HeatNetwork<double>::Vector;
+  static constexpr int most_steps = 2000;
+
+  struct Run {
+    Vector degC;
+    double time_s = 0.0;
+    int steps = 0;
+    Forecast forecast{};
+  };
+  Run begin(const CoreEstimator& core, double rest_s) const;
+  bool advance(Run& run, const CoreEstimator& core, const Piece& piece, const PhaseShares& shares) const;
+  Forecast play_after(double rest_s, const CoreEstimator& core, const Piece* pieces, int count,
+                      const PhaseShares& shares) const;
+
+  Transition<double> fine_, middle_, coarse_;
+};
+
+}  // namespace thermal
