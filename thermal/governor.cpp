@@ -88,6 +88,7 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
     unit[phase] = static_cast<double>(shares.k[k]);
   }
   rest[Drive::current_A2] = rest[Drive::current2_speed2] = 0.0;
+  unit[Drive::one] = 0.0;
   unit[Drive::current_A2] = 1.0;
   unit[Drive::current2_speed2] = core.input()[Drive::speed2_rad2_per_s2];
   const double capacity_J_per_K = core.network().capacity_J_per_K(node);

@@ -40,6 +40,7 @@ enum class Drive : std::uint8_t {
   speed_to_0_8,     // mean of |w|^0.8, for forced convection
   count
 };
+static_assert(static_cast<int>(Drive::one) == 0);
 inline constexpr int drive_count = static_cast<int>(Drive::count);
 
 enum class LinkLaw : std::uint8_t {
@@ -55,7 +56,7 @@ enum class LinkLaw : std::uint8_t {
 /// Data is double, or a dual number where a boundary or a drive is itself being fitted.
 template <class Data = double>
 struct HeatInput {
-  Data drive[drive_count] = {};
+  Data drive[drive_count] = {Data(1.0)};  // Drive::one comes first and is always 1
   Data boundary_degC[boundary_count] = {};
 
   Data& operator[](Drive d) { return drive[static_cast<int>(d)]; }
