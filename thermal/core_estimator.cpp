@@ -71,6 +71,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   sensor_degC_ = ambient_degC_;
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
+  due_K_ = Row::Zero(n_ + 5);
   widen_all();
   // Soaked: whatever the housing turns out to be, the winding is too.
   p_.topLeftCorner(n_, n_).setConstant(squared(start_sigma_K));
@@ -122,6 +123,7 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
     const double full_scale = is_current_square(i) ? static_cast<double>(settings_.full_scale_A2) : 1e4;
     if (is_current_square(i) || !(input_.drive[i] < full_scale)) input_.drive[i] = full_scale;
   }
+  input_[Drive::one] = 1.0;  // constant heat does not wait to be reported
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) {
     if (plausible(input[b])) {
       input_[b] = input[b];
@@ -178,7 +180,8 @@ void CoreEstimator::hear_housing(Reading housing) {
   const float leak = dt_f / movement_memory_s;
   const float sensor_degC = static_cast<float>(sensor_degC_);
   model_moved_K_ += sensor_degC - last_sensor_degC_ - leak * model_moved_K_;
-  last_sensor_degC_ = sensor_degC;
+  settle(1);
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // a correction is not a movement of the model
   pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
 
   const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
@@ -197,7 +200,7 @@ void CoreEstimator::hear_housing(Reading housing) {
   flags_ &= ~static_cast<std::uint32_t>(housing_missing);
   ++heard_;
   reading_sum_ += static_cast<double>(housing.value);
-  sensor_sum_ += sensor_degC_;
+  sensor_sum_ += sensor_degC_ + static_cast<double>(due_K_[sensor()]);  // as if it had all flowed in
   if (++window_ < window_steps) return;
 
   const float reading_degC = static_cast<float>(reading_sum_ / heard_);
@@ -214,7 +217,6 @@ void CoreEstimator::hear_housing(Reading housing) {
   reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
   reading_moved_K_ = reading_degC - reading_slow_degC_;
   correct_by_housing(innovation_K);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // the correction is not a movement of the model
 }
 
 void CoreEstimator::correct_by_housing(float innovation_K) {
@@ -222,7 +224,7 @@ void CoreEstimator::correct_by_housing(float innovation_K) {
   seen[sensor()] = 1.0f;
   const float noise = squared(settings_.housing_noise_K);
   if (!acquired_) {
-    acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity());
+    acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity(), 1);
     trusted_ambient_degC_ = ambient_degC_;
     return;
   }
@@ -237,22 +239,25 @@ void CoreEstimator::correct_by_housing(float innovation_K) {
     trusted_ambient_degC_ = ambient_degC_;
   }
   const bool stuck = tested && moved_K < stuck_share * expected_K && pulled_K_ > suspicious_pull_K;
-  const bool colder = innovation_K < -(sigma_K < least_gate_K ? sigma_K : least_gate_K) && pulled_K_ >= most_pull_K;
+  const bool colder = innovation_K < -least_gate_K && pulled_K_ >= most_pull_K;
   if (!(innovation_K > -gate_K) || (innovation_K < 0.0f && (stuck || colder))) {
     disbelieve_housing();
     return;
   }
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   const float left_K = most_pull_K - pulled_K_;
-  correct(seen, innovation_K, noise, left_K > 0.0f ? left_K : 0.0f);
+  correct(seen, innovation_K, noise, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
 /// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
 void CoreEstimator::disbelieve_housing() {
   if (!(flags_ & housing_contradicts)) {
-    for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(pulled_K_);
-    sensor_degC_ += static_cast<double>(pulled_K_);
-    if (trusted_ambient_degC_ > ambient_degC_) ambient_degC_ = trusted_ambient_degC_;
+    settle(due_steps_);
+    due_K_.head(n_).setConstant(pulled_K_);
+    due_K_[sensor()] = pulled_K_;
+    const float ambient_K = static_cast<float>(trusted_ambient_degC_ - ambient_degC_);
+    due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
+    due_steps_ = window_steps;
     p_(housing_.node, housing_.node) += squared(3.0f);
     p_(ambient(), ambient()) += squared(3.0f);
   }
@@ -269,8 +274,20 @@ float CoreEstimator::down_by(const Row& gain, float innovation_K) const {
   return down_K;
 }
 
-/// Schmidt-Kalman correction in Joseph form, shortened so that it lowers no winding by more than most_down_K.
-bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K) {
+/// Lets `steps` parts of the correction that is due flow into the state.
+void CoreEstimator::settle(int steps) {
+  if (due_steps_ <= 0 || steps <= 0) return;
+  const float part = static_cast<float>(steps) / static_cast<float>(due_steps_);
+  for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
+  ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
+  sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
+  due_K_ *= 1.0f - part;
+  due_steps_ -= steps;
+}
+
+/// Schmidt-Kalman correction in Joseph form, shortened so that it lowers no winding by more than most_down_K. It flows
+/// in over some steps: a jump of the estimate would be a jump of the allowance, which drops the robot.
+bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps) {
   const Row shared = p_.lazyProduct(seen);
   const float expected_K2 = seen.dot(shared) + variance_K2;
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
@@ -284,9 +301,10 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
     pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
   }
 
-  for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(gain[i] * innovation_K);
-  ambient_degC_ += static_cast<double>(gain[ambient()] * innovation_K);
-  sensor_degC_ += static_cast<double>(gain[sensor()] * innovation_K);
+  settle(due_steps_);
+  due_K_ = gain * innovation_K;
+  due_steps_ = over_steps;
+  if (over_steps == 1) settle(1);
   const Covariance keep = Covariance::Identity(n_ + 5, n_ + 5) - gain.lazyProduct(seen.transpose());
   const Covariance half = keep.lazyProduct(p_);
   p_ = half.lazyProduct(keep.transpose());
@@ -324,7 +342,7 @@ bool CoreEstimator::hear_winding(float seen_degC, float sigma_K) {
   if (!(innovation_K > -gate_K)) return false;
   // Hotter than believable still counts, but one reading is only one.
   return correct(seen, innovation_K < gate_K ? innovation_K : gate_K, squared(sigma_K),
-                 std::numeric_limits<float>::infinity());
+                 std::numeric_limits<float>::infinity(), 1);
 }
 
 void CoreEstimator::raise_to(float winding_degC) {
@@ -358,6 +376,8 @@ void CoreEstimator::restore(const float (&rise_K)[max_nodes], double off_s) {
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   acquired_ = false;
+  due_steps_ = 0;
+  due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = 0.0f;
   widen_all();
   p_(sensor(), sensor()) = p_(housing_.node, housing_.node);  // the sensor is as warm as what it sits on
@@ -386,6 +406,8 @@ void CoreEstimator::guard_state() {
   sensor_degC_ = degC_[housing_.node];
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   model_moved_K_ = 0.0f;
+  due_steps_ = 0;
+  due_K_ = Row::Zero(n_ + 5);
   good_degC_ = degC_;
 }
 

@@ -30,7 +30,7 @@ struct Trust {
   float cooling;           // links to the world (R2)
 };
 /// Catalogue values are good to 10..30 %. Identified: typical standard errors of a fit with core readings.
-inline constexpr Trust sheet_trust{0.15f, 0.20f, 0.20f};
+inline constexpr Trust sheet_trust{0.20f, 0.20f, 0.20f};
 inline constexpr Trust identified_trust{0.02f, 0.04f, 0.05f};
 inline constexpr Trust exact_trust{0.0f, 0.0f, 0.0f};
 
@@ -91,6 +91,8 @@ class CoreEstimator {
   void restore(const float (&rise_K)[max_nodes], double off_s);
 
   const Estimate& estimate() const { return estimate_; }
+  /// How much faster T + k sigma rises than T when heat is poured in.
+  float burst_margin() const { return 1.0f + settings_.margin_sigmas * settings_.trust.power; }
   const HeatNetwork<double>& network() const { return network_; }
   /// The input of the last step as it was believed, ambient included.
   const HeatInput<>& input() const { return input_; }
@@ -108,7 +110,8 @@ class CoreEstimator {
   void correct_by_housing(float innovation_K);
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
-  bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K);
+  bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps);
+  void settle(int steps);
   float down_by(const Row& gain, float innovation_K) const;
   void guard_state();
   void publish();
@@ -127,6 +130,8 @@ class CoreEstimator {
   Vector degC_, good_degC_;
   double ambient_degC_, good_ambient_degC_, sensor_degC_;
   Covariance p_;
+  Row due_K_;  // what the last correction has yet to add, in due_steps_ steps
+  int due_steps_ = 0;
   HeatInput<> input_;
 
   // The housing sensor's record.

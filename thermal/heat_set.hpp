@@ -24,7 +24,7 @@ inline constexpr int boundary_count = static_cast<int>(Boundary::count);
 
 /// What drives a source: means over one step, each nonlinear form taken before the mean.
 enum class Drive : std::uint8_t {
-  one,         // constant heat
+  one,         // constant heat: 1 (the estimator takes it as 1 whatever it is given)
   phase_a_A2,  // square of the current in one phase
   phase_b_A2,
   phase_c_A2,
@@ -40,7 +40,6 @@ enum class Drive : std::uint8_t {
   speed_to_0_8,     // mean of |w|^0.8, for forced convection
   count
 };
-static_assert(static_cast<int>(Drive::one) == 0);
 inline constexpr int drive_count = static_cast<int>(Drive::count);
 
 enum class LinkLaw : std::uint8_t {
@@ -56,7 +55,7 @@ enum class LinkLaw : std::uint8_t {
 /// Data is double, or a dual number where a boundary or a drive is itself being fitted.
 template <class Data = double>
 struct HeatInput {
-  Data drive[drive_count] = {Data(1.0)};  // Drive::one comes first and is always 1
+  Data drive[drive_count] = {};
   Data boundary_degC[boundary_count] = {};
 
   Data& operator[](Drive d) { return drive[static_cast<int>(d)]; }
