@@ -288,7 +288,8 @@ void CoreEstimator::settle(int steps) {
 /// Schmidt-Kalman correction in Joseph form, shortened so that it lowers no winding by more than most_down_K. It flows
 /// in over some steps: a jump of the estimate would be a jump of the allowance, which drops the robot.
 bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps) {
-  const Row shared = p_.lazyProduct(seen);
+  Row shared = Row::Zero(n_ + 5);
+  shared = p_.lazyProduct(seen);
   const float expected_K2 = seen.dot(shared) + variance_K2;
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
