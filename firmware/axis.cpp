@@ -52,8 +52,8 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
     setpoint_.configure(p, rating);
     permit_ = Permit(p, rating);
     current_loop_ = CurrentLoop(p, rating);
-    usable_ratio_ = 1.0f - rating.sampling_window_s * rating.pwm_Hz;
-    dead_time_ = DeadTime(rating.dead_time_s, rating.pwm_Hz, p.dead_time_soft_A, usable_ratio_);
+    usable_ratio_ = std::fmin(1.0f - rating.sampling_window_s * rating.pwm_Hz, full_bus);
+    dead_time_ = DeadTime(rating.dead_time_s, rating.pwm_Hz, p.dead_time_soft_A);
     // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
     quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
     offset_bound_A_ = p.offset_bound_A;
@@ -71,83 +71,69 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
 hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   if (commands_.load(std::memory_order_relaxed) != 0) obey();
   const Sight sight = guard_.admits(sample);
-  if (sight.verdict != Verdict::fresh) return unseen(sight);
+  if (sight.verdict != Verdict::fresh) return unseen(sight.verdict);
 
   const Abc phase_A = offsets_.correct(sample.current_A);
   const RotorAngle rotor = rotor_.follow(sample.rotor_rad, sight.periods);
-  const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample_rad));
-  add_heat(phase_A, sample.bus_V, sight.periods);
+  const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample));
+  HeatSums& sums = heat_.adding();
+  add_heat(sums, phase_A, sight.periods);
 
-  const Setpoint::Asked asked = setpoint_.follow(sight.periods);
-  if (mode_ != Mode::running || !asked.alive) return resting(sample, current_A, asked, sight.periods);
+  setpoint_.follow(sight.periods);
+  if (mode_ != Mode::running || !(setpoint_.share() > 0.0f)) return resting(sample, current_A, sight.periods);
 
-  const Permitted permitted =
-      permit_.permit(asked, allowance_, allowance_age_periods_, sample.bus_V, rotor_.rad_per_s());
+  const Permitted permitted = permit_.permit(setpoint_, allowance_, sums.periods, sample.bus_V, rotor_.rad_per_s());
   const Dq error_A = {permitted.current_A.d - current_A.d, permitted.current_A.q - current_A.q};
   const Dq asked_V = current_loop_.ask(error_A, current_A, rotor_.electrical_rad_per_s());
 
-  const SinCos ahead = sin_cos(rotor.at_output_rad);
-  const Modulated pulses = modulate(inverse_clarke(unpark(asked_V, ahead)), sample.bus_V, usable_ratio_);
+  const SinCos ahead = sin_cos(rotor.at_output);
+  const Abc phase_V = dead_time_.compensate(inverse_clarke(unpark(asked_V, ahead)),
+                                            inverse_clarke(unpark(permitted.current_A, ahead)), sample.bus_V);
+  const Modulated pulses = modulate(phase_V, sample.bus_V, usable_ratio_);
   current_loop_.settle(error_A, asked_V, pulses.share);
-  const Abc ratio = dead_time_.compensate(pulses.ratio, inverse_clarke(unpark(permitted.current_A, ahead)));
+  if (!guard_.passes(pulses.ratio)) return trip(guard_.found());
 
-  if (!guard_.passes(ratio)) return trip(guard_.found());
-  fast_ = {current_A,
-           permitted.current_A,
-           {asked_V.d * pulses.share, asked_V.q * pulses.share},
-           ratio,
-           sample.bus_V,
-           rotor_.rad_per_s(),
-           permitted.reason != wire::Limit::none || pulses.share >= 1.0f ? permitted.reason : wire::Limit::voltage};
-  return last_ = {ratio, true};
+  trace_.note(current_A, permitted.current_A, asked_V, pulses.share, sample.bus_V, permitted.reason);
+  return last_ = {pulses.ratio, true};
 }
 
-/// Adds what one sample says, and charges the periods that were missed before it a tenth above the last current.
-void Axis::add_heat(const Abc& phase_A, float bus_V, std::uint32_t periods) {
-  const Abc now_A2 = {phase_A.a * phase_A.a, phase_A.b * phase_A.b, phase_A.c * phase_A.c};
-  HeatSums& sums = heat_.adding();
-  if (periods != 1) add_missed(sums, now_A2, periods - 1);
-  sums.phase_A2 = {sums.phase_A2.a + now_A2.a, sums.phase_A2.b + now_A2.b, sums.phase_A2.c + now_A2.c};
-  sums.rad_per_s += std::fabs(rotor_.rad_per_s());
-  sums.bus_V += bus_V;
+/// Adds what one sample says; the periods that were missed before it are charged first, hotter.
+inline void Axis::add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods) {
+  if (periods != 1) add_missed(sums, periods - 1);
+  sums.phase_A2.a += phase_A.a * phase_A.a;
+  sums.phase_A2.b += phase_A.b * phase_A.b;
+  sums.phase_A2.c += phase_A.c * phase_A.c;
   sums.periods += 1;
-  sums.driven += last_.on ? 1u : 0u;
-  last_A2_ = now_A2;
-  allowance_age_periods_ += periods;
 }
 
-void Axis::add_missed(HeatSums& sums, const Abc& now_A2, std::uint32_t missed) {
-  const float weight = 1.21f * static_cast<float>(missed);  // 1.1 in current
-  const auto hotter = [](float x, float y) { return x > y ? x : y; };
-  sums.phase_A2.a += weight * hotter(now_A2.a, last_A2_.a);
-  sums.phase_A2.b += weight * hotter(now_A2.b, last_A2_.b);
-  sums.phase_A2.c += weight * hotter(now_A2.c, last_A2_.c);
-  sums.bus_V += fast_.bus_V * static_cast<float>(missed);
-  sums.rad_per_s += std::fabs(rotor_.rad_per_s()) * static_cast<float>(missed);
+/// A tenth above the last current, and at its peak in every phase: nobody saw where the rotor went.
+void Axis::add_missed(HeatSums& sums, std::uint32_t missed) {
+  const float times = static_cast<float>(missed);
+  const Dq i = trace_.current_A;
+  const float hot_A2 = 1.21f * times * (i.d * i.d + i.q * i.q);
+  sums.phase_A2 = {sums.phase_A2.a + hot_A2, sums.phase_A2.b + hot_A2, sums.phase_A2.c + hot_A2};
   sums.periods += missed;
-  sums.driven += last_.on ? missed : 0u;
 }
 
 /// No sample to work with: one period goes on as it was, the second trips if the bridge could be on.
-hal::Duty Axis::unseen(const Sight& sight) {
+hal::Duty Axis::unseen(Verdict verdict) {
   sees_ = false;
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
-  if (sight.verdict == Verdict::bridged) return last_;
+  if (verdict == Verdict::bridged) return last_;
   if (mode_ == Mode::ready || mode_ == Mode::running) return trip(guard_.found());
   return last_ = released;
 }
 
 /// A good sample with nothing to drive: follows the modes, learns the offset while off.
-hal::Duty Axis::resting(const hal::AxisSample& sample, const Dq& current_A, const Setpoint::Asked& asked,
-                        std::uint32_t periods) {
+hal::Duty Axis::resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods) {
   sees_ = true;
-  fast_ = {current_A, {}, {}, released.ratio, sample.bus_V, rotor_.rad_per_s(), wire::Limit::none};
+  trace_.note(current_A, {0.0f, 0.0f}, {0.0f, 0.0f}, 1.0f, sample.bus_V, wire::Limit::none);
   last_ = released;
   if (mode_ == Mode::running) {
     change(Event::stop);
-    fast_.limit = wire::Limit::setpoint_old;
-  } else if (mode_ == Mode::ready && asked.alive) {
+    trace_.limit = wire::Limit::setpoint_old;
+  } else if (mode_ == Mode::ready && setpoint_.share() > 0.0f) {
     change(Event::start);
     current_loop_.reset();
   } else if (mode_ == Mode::off && std::fabs(rotor_.rad_per_s()) < quiet_rad_per_s_per_V_ * sample.bus_V) {
@@ -210,6 +196,13 @@ void Axis::obey() {
   }
 }
 
+FastView Axis::fast() const {
+  const float share = trace_.share;
+  const bool saturated = trace_.limit == wire::Limit::none && share < 1.0f;
+  return {trace_.current_A, trace_.permitted_A, {trace_.asked_V.d * share, trace_.asked_V.q * share}, last_.ratio,
+          trace_.bus_V,     rotor_.rad_per_s(), saturated ? wire::Limit::voltage : trace_.limit};
+}
+
 FaultRecord Axis::fault() const {
   FaultRecord record = fault_;
   record.age_s = static_cast<float>(tripped_periods_) * period_s_;
@@ -224,20 +217,20 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   const int steps = static_cast<int>(static_cast<float>(sums.periods) * period_s_ * slow_Hz + 0.5f);
   core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
-  allowance_age_periods_ = 0;
   publish();
 }
 
-/// Means over the step. No sample at all: what went on before, as long as the bridge is on.
+/// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
+/// on before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
   thermal::HeatInput<> input{};
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
   } else {
     const float share = 1.0f / static_cast<float>(sums.periods);
-    const float enabled = static_cast<float>(sums.driven) * share;
+    const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
     // Ripple that sampling in the zero vector cannot see, from the last duty; half of its square in each phase.
-    const float ripple_A2 = enabled * thermal::ripple_A2(fast_.ratio, sums.bus_V * share, inductance_H_, pwm_Hz_);
+    const float ripple_A2 = enabled * thermal::ripple_A2(last_.ratio, trace_.bus_V, inductance_H_, pwm_Hz_);
     const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
     double vector_A2 = 0.0;
     for (int k = 0; k < 3; ++k) {
@@ -248,7 +241,7 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
     input[thermal::Drive::current_A2] = vector_A2;
     input[thermal::Drive::current_A] = std::sqrt(vector_A2);
     input[thermal::Drive::enabled] = static_cast<double>(enabled);
-    thermal::set_speed(input, static_cast<double>(sums.rad_per_s * share), vector_A2);
+    thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()), vector_A2);
   }
   input[thermal::Drive::one] = 1.0;
   // Nobody measures these here: as warm as the surroundings are believed to be.
@@ -270,7 +263,7 @@ Allowance Axis::permitted_by(const thermal::Allowance& core, const Allowance& bo
   else
     blind_cap_A_ = aim_A;
 
-  Allowance least{configured_ ? peak_A_ : 0.0f, wire::Limit::hardware};
+  Allowance least = permit_.most();  // nothing if the parameters were refused
   const auto lower = [&least](float current_A, wire::Limit reason) {
     if (current_A >= least.current_A) return;
     least = {current_A > 0.0f ? current_A : 0.0f, reason};
@@ -287,7 +280,7 @@ void Axis::publish() {
   const thermal::Estimate& now = core_.estimate();
   AxisState state;
   state.mode = mode_;
-  state.fast = fast_;
+  state.fast = fast();
   int winding = 0;
   float hottest_degC = -nothing_degC;
   for (int i = 0; i < now.node_count; ++i) {
@@ -302,7 +295,7 @@ void Axis::publish() {
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];
   state.housing_degC = static_cast<float>(now.housing_degC);
   state.allowance_A = allowance_.current_A;
-  state.limit = fast_.limit;
+  state.limit = state.fast.limit;
   state.estimate_flags = now.flags;
   state.fault = fault();
   state_ = state;

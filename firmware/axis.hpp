@@ -43,21 +43,21 @@ struct AxisSetup {
   bool senses_housing = true;  // false: model alone. true and no reading: at most 60 % of the continuous current
 };
 
-/// What the last fast tick saw and did. Read by telemetry and the slow lane, never by the law.
+/// What the last fast tick saw and did: for telemetry and the slow lane.
 struct FastView {
-  Dq current_A{};    // measured
-  Dq permitted_A{};  // the reference of the current loop
-  Dq voltage_V{};    // that reached the bridge, before dead-time compensation
-  Abc ratio{0.5f, 0.5f, 0.5f};
-  float bus_V = 0.0f;
-  float rad_per_s = 0.0f;  // mechanical
-  wire::Limit limit = wire::Limit::none;
+  Dq current_A;    // measured
+  Dq permitted_A;  // the reference of the current loop
+  Dq voltage_V;    // that reached the bridge, before dead-time compensation
+  Abc ratio;
+  float bus_V;
+  float rad_per_s;  // mechanical
+  wire::Limit limit;
 };
 
 /// Everything about an axis, once per slow tick.
 struct AxisState {
   Mode mode = Mode::off;
-  FastView fast;
+  FastView fast{};
   float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
   float core_sigma_K = 0.0f;              // of the hottest
   float housing_degC = 0.0f;              // estimated
@@ -92,7 +92,7 @@ class Axis {
 
   /// Live: as of the last tick.
   Mode mode() const { return mode_; }
-  const FastView& fast() const { return fast_; }
+  FastView fast() const;
   FaultRecord fault() const;
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
 
@@ -107,12 +107,11 @@ class Axis {
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   wire::Status against_arming() const;
   [[gnu::noinline]] void obey();
-  [[gnu::noinline]] hal::Duty unseen(const Sight& sight);
-  [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, const Dq& current_A, const Setpoint::Asked& asked,
-                                      std::uint32_t periods);
+  [[gnu::noinline]] hal::Duty unseen(Verdict verdict);
+  [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
-  void add_heat(const Abc& phase_A, float bus_V, std::uint32_t periods);
-  [[gnu::noinline]] void add_missed(HeatSums& sums, const Abc& now_A2, std::uint32_t missed);
+  void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
+  [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
   thermal::HeatInput<> heat_input(const HeatSums& sums) const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
@@ -121,6 +120,8 @@ class Axis {
   // The two hand-overs between the lanes.
   HeatHandOver heat_;
   Allowance allowance_{0.0f, wire::Limit::thermal_late};
+
+  std::atomic<std::uint8_t> commands_{0};  // posted, for the next tick
 
   // Fast lane, in the order of the walk.
   Guard guard_;
@@ -132,13 +133,25 @@ class Axis {
   DeadTime dead_time_;
   float usable_ratio_ = 1.0f;  // 1 - sampling window
   hal::Duty last_{{0.5f, 0.5f, 0.5f}, false};
+  /// Written by each tick; the law does not read it back, but for the current that missed samples are charged with.
+  struct Trace {
+    Dq current_A{}, permitted_A{}, asked_V{};
+    float share = 1.0f, bus_V = 0.0f;
+    wire::Limit limit = wire::Limit::none;
+
+    void note(Dq current, Dq permitted, Dq asked, float given, float bus, wire::Limit why) {
+      // By component: the compiler copies a whole Dq by way of the stack.
+      current_A.d = current.d, current_A.q = current.q;
+      permitted_A.d = permitted.d, permitted_A.q = permitted.q;
+      asked_V.d = asked.d, asked_V.q = asked.q;
+      share = given, bus_V = bus, limit = why;
+    }
+  } trace_;
   Mode mode_ = Mode::off;
   bool configured_ = false;             // the parameter set is complete and valid
   bool sees_ = false;                   // the last sample was admitted
   float quiet_rad_per_s_per_V_ = 0.0f;  // below it the back-EMF cannot push current through the diodes
   float offset_bound_A_ = 0.0f;
-  Abc last_A2_{0.0f, 0.0f, 0.0f};
-  std::uint32_t allowance_age_periods_ = 0;
 
   // Slow lane, in the order of the walk.
   thermal::CoreEstimator core_;
@@ -153,9 +166,7 @@ class Axis {
   std::uint32_t tripped_periods_ = 0;
   float period_s_ = 0.0f;
   FaultRecord fault_;
-  FastView fast_;
   AxisState state_;
-  std::atomic<std::uint8_t> commands_{0};
   std::uint8_t index_;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "firmware/guard.hpp"
 
+#include <cmath>
+
 namespace firmware {
 
 Sight Guard::refuse(wire::Fault fault, float value, float threshold) {
@@ -21,7 +23,7 @@ Sight Guard::judge(const hal::AxisSample& s, std::uint32_t periods) {
     if (s.bus_V > bus_max_V_) return refuse(wire::Fault::bus_over_voltage, s.bus_V, bus_max_V_);
     if (s.bus_V < bus_min_V_) return refuse(wire::Fault::bus_under_voltage, s.bus_V, bus_min_V_);
   }
-  const bool usable = s.valid && between(s.rotor_rad, 0.0f, full_turn_rad);
+  const bool usable = s.valid && turn_rad.holds(s.rotor_rad);
   if (usable && gap_ == 0) {  // the first sample ever has no predecessor
     gap_ = longest_gap;
     sequence_ = s.sequence;

@@ -2,13 +2,13 @@
 // Stands at both ends of the fast lane and nowhere in the middle: what comes in must be believable, what goes out must
 // be a duty. It finds; the axis decides (a fault found while the bridge is open trips nothing).
 //
-// One bad sample alone is bridged, the second in a row is a fault; a number that is out of bounds is one at once. All
-// comparisons are written so that NaN fails them, quietly (no floating-point trap). ISR.
+// One bad sample alone is bridged, the second in a row is a fault; a number that is out of bounds is one at once. No
+// NaN passes a comparison. ISR.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
+#include "firmware/bits.hpp"
 #include "firmware/board_rating.hpp"
 #include "hal/axis_port.hpp"
 #include "wire/codes.hpp"
@@ -39,6 +39,7 @@ class Guard {
   Guard() = default;
   explicit Guard(const BoardRating& rating)
       : trip_A_(rating.trip_A),
+        bus_V_(rating.bus_min_V, rating.bus_max_V),
         bus_min_V_(rating.bus_min_V),
         bus_max_V_(rating.bus_max_V),
         period_s_(1.0f / rating.pwm_Hz) {}
@@ -46,8 +47,7 @@ class Guard {
   Sight admits(const hal::AxisSample& s) {
     const std::uint32_t periods = s.sequence - sequence_;
     if (s.valid && periods - 1u < gap_ && within(s.current_A.a, trip_A_) && within(s.current_A.b, trip_A_) &&
-        within(s.current_A.c, trip_A_) && between(s.bus_V, bus_min_V_, bus_max_V_) &&
-        between(s.rotor_rad, 0.0f, full_turn_rad)) {
+        within(s.current_A.c, trip_A_) && bus_V_.holds(s.bus_V) && turn_rad.holds(s.rotor_rad)) [[likely]] {
       sequence_ = s.sequence;
       misses_ = 0;
       return {Verdict::fresh, periods};
@@ -57,8 +57,9 @@ class Guard {
 
   /// True if the three ratios can be loaded.
   bool passes(const wire::Abc& ratio) {
-    if (between(ratio.a, 0.0f, 1.0f) && between(ratio.b, 0.0f, 1.0f) && between(ratio.c, 0.0f, 1.0f)) return true;
-    const float worst = !between(ratio.a, 0.0f, 1.0f) ? ratio.a : !between(ratio.b, 0.0f, 1.0f) ? ratio.b : ratio.c;
+    if (unit.holds(ratio.a) && unit.holds(ratio.b) && unit.holds(ratio.c)) [[likely]]
+      return true;
+    const float worst = !unit.holds(ratio.a) ? ratio.a : !unit.holds(ratio.b) ? ratio.b : ratio.c;
     found_ = {wire::Fault::not_finite, 0, worst, 1.0f, 0.0f};
     return false;
   }
@@ -67,19 +68,17 @@ class Guard {
   const FaultRecord& found() const { return found_; }
 
  private:
-  static bool within(float x, float bound) { return std::islessequal(std::fabs(x), bound); }
-  static bool between(float x, float low, float high) {
-    return std::isgreaterequal(x, low) && std::islessequal(x, high);
-  }
-
   [[gnu::noinline]] Sight judge(const hal::AxisSample& s, std::uint32_t periods);
   Sight refuse(wire::Fault fault, float value, float threshold);
 
+  static constexpr Range turn_rad{0.0f, full_turn_rad}, unit{0.0f, 1.0f};
+
   float trip_A_ = 0.0f;
-  float bus_min_V_ = 1.0f, bus_max_V_ = 0.0f;  // as built by default it admits nothing
+  Range bus_V_;
+  float bus_min_V_ = 0.0f, bus_max_V_ = 0.0f;
   float period_s_ = 0.0f;
   std::uint32_t sequence_ = 0, misses_ = 0;
-  std::uint32_t gap_ = 0;  // longest_gap once a first sample was seen
+  std::uint32_t gap_ = 0;  // longest_gap once a first sample was seen; until then `admits` asks `judge`
   FaultRecord found_;
 };
 

@@ -17,27 +17,27 @@ struct Modulated {
   float share;  // of the asked voltage, 0..1
 };
 
-/// usable_ratio = 1 - w. bus_V > 0. Rounding may leave a ratio a last place outside its bound (DeadTime clamps).
+/// A millionth of the bus is left unused, so that rounding cannot lift a ratio above 1.
+inline constexpr float full_bus = 0.999999f;
+
+/// usable_ratio = 1 - w, at most full_bus. bus_V > 0.
 constexpr Modulated modulate(const Abc& asked_V, float bus_V, float usable_ratio) {
   const float high_ab = asked_V.a > asked_V.b ? asked_V.a : asked_V.b;
   const float low_ab = asked_V.a > asked_V.b ? asked_V.b : asked_V.a;
   const float high_V = asked_V.c > high_ab ? asked_V.c : high_ab;
   const float low_V = asked_V.c < low_ab ? asked_V.c : low_ab;
-  const float middle_V = asked_V.c > high_ab ? high_ab : asked_V.c < low_ab ? low_ab : asked_V.c;
 
   const float per_V = 1.0f / bus_V;
   float spread = (high_V - low_V) * per_V;
-  const float lower_spread = (middle_V - low_V) * per_V;
   float share = 1.0f;
-  if (spread > 1.0f || lower_spread > usable_ratio) {
-    share = 1.0f / spread;
+  float lowest = 0.5f - 0.5f * spread;
+  if (lowest + spread > usable_ratio) {  // centred pulses would close a window
+    const float middle_V = asked_V.c > high_ab ? high_ab : asked_V.c < low_ab ? low_ab : asked_V.c;
+    const float lower_spread = (middle_V - low_V) * per_V;
+    if (spread > full_bus) share = full_bus / spread;
     if (share * lower_spread > usable_ratio) share = usable_ratio / lower_spread;
     spread *= share;
-  }
-  float lowest = 0.5f - 0.5f * spread;
-  if (lowest + spread > usable_ratio) {
-    lowest = usable_ratio - spread;
-    if (lowest < 0.0f) lowest = 0.0f;
+    lowest = usable_ratio > spread ? usable_ratio - spread : 0.0f;
   }
   const float gain = share * per_V;
   return {

@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "firmware/axis_parameters.hpp"
+#include "firmware/bits.hpp"
 #include "firmware/setpoint.hpp"
 #include "firmware/transforms.hpp"
 #include "wire/codes.hpp"
@@ -36,36 +37,39 @@ class Permit {
 
   Permit() = default;
   Permit(const AxisParameters& p, const BoardRating& rating)
-      : hardware_A_(rating.peak_A),
-        configured_A_(p.current_limit_A),
+      : most_A_(p.current_limit_A < rating.peak_A ? p.current_limit_A : rating.peak_A),
+        most_reason_(p.current_limit_A < rating.peak_A ? wire::Limit::configured : wire::Limit::hardware),
         late_A_(late_share * rating.continuous_A),
+        sound_A_(0.0f, most_A_),
+        easy_bus_V_(p.bus_low_start_V, p.bus_high_start_V),
         patience_periods_(static_cast<std::uint32_t>(patience_s * rating.pwm_Hz)),
-        high_start_V_(p.bus_high_start_V),
         high_end_V_(p.bus_high_end_V),
         high_A_per_V_(rating.peak_A / (p.bus_high_end_V - p.bus_high_start_V)),
-        low_start_V_(p.bus_low_start_V),
         low_end_V_(p.bus_low_end_V),
         low_A_per_V_(rating.peak_A / (p.bus_low_start_V - p.bus_low_end_V)) {}
 
-  Permitted permit(const Setpoint::Asked& asked, const Allowance& allowance, std::uint32_t allowance_age_periods,
-                   float bus_V, float rad_per_s) const {
-    float limit_A = hardware_A_;
-    wire::Limit reason = wire::Limit::hardware;
-    tighten(limit_A, reason, configured_A_, wire::Limit::configured);
-    tighten(limit_A, reason, allowance.current_A, allowance.reason);
+  /// The largest |i| whatever the slow lane says, and why: what it starts from.
+  Allowance most() const { return {most_A_, most_reason_}; }
+
+  /// allowance.current_A must lie within [0, most]: what does not is broken memory and allows nothing.
+  Permitted permit(const Setpoint& asked, const Allowance& allowance, std::uint32_t allowance_age_periods, float bus_V,
+                   float rad_per_s) const {
+    float limit_A = sound_A_.holds(allowance.current_A) ? allowance.current_A : 0.0f;
+    wire::Limit reason = allowance.reason;
     if (allowance_age_periods > patience_periods_) tighten(limit_A, reason, late_A_, wire::Limit::thermal_late);
-    if (!(bus_V >= low_start_V_ && bus_V <= high_start_V_)) {
-      const bool brakes = asked.current_A.q * rad_per_s < 0.0f;
+    if (!easy_bus_V_.holds(bus_V)) [[unlikely]] {
+      const bool brakes = asked.current_A().q * rad_per_s < 0.0f;
       if (brakes)
         tighten(limit_A, reason, (high_end_V_ - bus_V) * high_A_per_V_, wire::Limit::bus_high);
       else
         tighten(limit_A, reason, (bus_V - low_end_V_) * low_A_per_V_, wire::Limit::bus_low);
     }
-    const float asked_A2 = asked.current_A.d * asked.current_A.d + asked.current_A.q * asked.current_A.q;
-    if (asked_A2 <= limit_A * limit_A)
-      return {asked.current_A, asked.old ? wire::Limit::setpoint_old : wire::Limit::none};
-    const float scale = asked_A2 > 0.0f ? limit_A / std::sqrt(asked_A2) : 0.0f;
-    return {{asked.current_A.d * scale, asked.current_A.q * scale}, reason};
+    const Dq wish_A = {asked.current_A().d * asked.share(), asked.current_A().q * asked.share()};
+    const float wish_A2 = wish_A.d * wish_A.d + wish_A.q * wish_A.q;
+    if (wish_A2 <= limit_A * limit_A)
+      return {wish_A, asked.share() < 1.0f ? wire::Limit::setpoint_old : wire::Limit::none};
+    const float scale = limit_A / std::sqrt(wish_A2);
+    return {{wish_A.d * scale, wish_A.q * scale}, reason};
   }
 
  private:
@@ -75,10 +79,13 @@ class Permit {
     reason = why;
   }
 
-  float hardware_A_ = 0.0f, configured_A_ = 0.0f, late_A_ = 0.0f;
+  float most_A_ = 0.0f;
+  wire::Limit most_reason_ = wire::Limit::hardware;
+  float late_A_ = 0.0f;
+  Range sound_A_, easy_bus_V_;
   std::uint32_t patience_periods_ = 0;
-  float high_start_V_ = 0.0f, high_end_V_ = 0.0f, high_A_per_V_ = 0.0f;
-  float low_start_V_ = 0.0f, low_end_V_ = 0.0f, low_A_per_V_ = 0.0f;
+  float high_end_V_ = 0.0f, high_A_per_V_ = 0.0f;
+  float low_end_V_ = 0.0f, low_A_per_V_ = 0.0f;
 };
 
 }  // namespace firmware

@@ -12,57 +12,70 @@
 #include <cstdint>
 
 #include "firmware/axis_parameters.hpp"
+#include "firmware/bits.hpp"
+#include "firmware/transforms.hpp"
 #include "hal/axis_port.hpp"
 
 namespace firmware {
 
-inline constexpr float pi = 3.14159265f;
-
 struct RotorAngle {
-  float at_sample_rad;  // electrical
-  float at_output_rad;  // electrical
+  ElectricalAngle at_sample;
+  ElectricalAngle at_output;  // in the middle of the PWM period that the duty acts in
 };
 
 class Rotor {
  public:
   Rotor() = default;
   Rotor(const AxisParameters& p, const BoardRating& rating)
-      : period_s_(1.0f / rating.pwm_Hz), pole_pairs_(p.pole_pairs_count), offset_rad_(p.angle_offset_rad) {
-    const float pole = 1.0f / (1.0f + 2.0f * pi * p.rotor_bandwidth_Hz * period_s_);
+      : pole_pairs_(static_cast<std::uint32_t>(p.pole_pairs_count)),
+        electrical_per_mechanical_(p.pole_pairs_count),
+        offset_(quarters_of(p.angle_offset_rad)) {
+    const float pole = 1.0f / (1.0f + 2.0f * pi * p.rotor_bandwidth_Hz / rating.pwm_Hz);
     angle_gain_ = 1.0f - pole * pole;
-    speed_gain_per_s_ = (1.0f - pole) * (1.0f - pole) * rating.pwm_Hz;
-    max_rad_per_s_ = 0.25f * pi * rating.pwm_Hz;
+    speed_gain_ = (1.0f - pole) * (1.0f - pole) * rating.pwm_Hz * rad_per_turn32;
+    turn32_per_speed_ = 1.0f / (rating.pwm_Hz * rad_per_turn32);
+    ahead_per_speed_ = turn32_per_speed_ * hal::output_delay_periods * p.pole_pairs_count;
+    // A quarter of an electrical turn per period: beyond it there is no sine left to modulate, and 1.5 periods of it
+    // still fit into half a turn.
+    max_rad_per_s_ = 0.5f * pi * rating.pwm_Hz / p.pole_pairs_count;
   }
 
+  /// mechanical_rad within [0, 2 pi].
   RotorAngle follow(float mechanical_rad, std::uint32_t periods) {
+    const std::uint32_t measured = quarters_of(mechanical_rad);
     if (periods == 1) {
-      const float expected_rad = tracked_rad_ + speed_rad_per_s_ * period_s_;
-      const float error_rad = within_half_turn(mechanical_rad - expected_rad);
-      tracked_rad_ = within_half_turn(expected_rad + angle_gain_ * error_rad);
-      speed_rad_per_s_ = clamped(speed_rad_per_s_ + speed_gain_per_s_ * error_rad, max_rad_per_s_);
+      const std::uint32_t expected = tracked_ + whole(rad_per_s_ * turn32_per_speed_);
+      const float error = static_cast<float>(static_cast<std::int32_t>(measured - expected));
+      tracked_ = expected + whole(angle_gain_ * error);
+      rad_per_s_ += speed_gain_ * error;
+      if (!within(rad_per_s_, max_rad_per_s_)) rad_per_s_ = rad_per_s_ > 0.0f ? max_rad_per_s_ : -max_rad_per_s_;
     } else {
-      tracked_rad_ = within_half_turn(mechanical_rad);  // after a gap the speed stands, the angle starts anew
+      tracked_ = measured;  // after a gap the speed stands, the angle starts anew
     }
-    const float electrical_rad = mechanical_rad * pole_pairs_ - offset_rad_;
-    return {electrical_rad, electrical_rad + electrical_rad_per_s() * (hal::output_delay_periods * period_s_)};
+    const std::uint32_t electrical = measured * pole_pairs_ - offset_;
+    return {{electrical}, {electrical + whole(rad_per_s_ * ahead_per_speed_)}};
   }
 
-  float rad_per_s() const { return speed_rad_per_s_; }  // mechanical
-  float electrical_rad_per_s() const { return speed_rad_per_s_ * pole_pairs_; }
+  float rad_per_s() const { return rad_per_s_; }  // mechanical
+  float electrical_rad_per_s() const { return rad_per_s_ * electrical_per_mechanical_; }
 
  private:
-  /// For |x| < 3 pi.
-  static float within_half_turn(float x_rad) {
-    if (x_rad > pi) return x_rad - 2.0f * pi;
-    if (x_rad < -pi) return x_rad + 2.0f * pi;
-    return x_rad;
-  }
-  static float clamped(float x, float bound) { return x > bound ? bound : x < -bound ? -bound : x; }
+  static constexpr float rad_per_turn32 = 2.0f * pi / 4294967296.0f;
 
-  float period_s_ = 0.0f, pole_pairs_ = 0.0f, offset_rad_ = 0.0f;
-  float angle_gain_ = 0.0f, speed_gain_per_s_ = 0.0f;
-  float max_rad_per_s_ = 0.0f;  // an eighth of a turn per period: keeps every angle in reach of one correction
-  float tracked_rad_ = 0.0f, speed_rad_per_s_ = 0.0f;
+  /// Angle to turns of 2^32, by way of a quarter of it so that 2 pi fits into an int; |angle| <= 2 pi.
+  static constexpr std::uint32_t quarters_of(float rad) {
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(rad * (0.25f / rad_per_turn32))) << 2;
+  }
+  static std::uint32_t whole(float turn32) { return static_cast<std::uint32_t>(static_cast<std::int32_t>(turn32)); }
+
+  std::uint32_t pole_pairs_ = 1;
+  float electrical_per_mechanical_ = 1.0f;
+  std::uint32_t offset_ = 0;
+  float angle_gain_ = 0.0f, speed_gain_ = 0.0f;
+  float turn32_per_speed_ = 0.0f, ahead_per_speed_ = 0.0f;
+  float max_rad_per_s_ = 0.0f;
+  std::uint32_t tracked_ = 0;
+  float rad_per_s_ = 0.0f;
 };
 
 }  // namespace firmware

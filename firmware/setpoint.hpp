@@ -19,12 +19,6 @@ inline constexpr float largest_setpoint_A = 1000.0f;  // beyond any board: not a
 
 class Setpoint {
  public:
-  struct Asked {
-    Dq current_A;  // already faded
-    bool alive;    // false: gone, the bridge may open
-    bool old;      // fading
-  };
-
   /// Before the first tick.
   void configure(const AxisParameters& p, const BoardRating& rating) {
     timeout_periods_ = static_cast<std::uint32_t>(p.setpoint_timeout_s * rating.pwm_Hz);
@@ -36,43 +30,47 @@ class Setpoint {
     if (!(within(current_A.d) && within(current_A.q))) return wire::Status::not_a_current;
     const std::uint32_t serial = serial_.load(std::memory_order_relaxed) + 1;
     slots_[serial & 1] = current_A;
-    serial_.store(serial, std::memory_order_release);
+    std::atomic_signal_fence(std::memory_order_release);  // one core: the interrupt sees what the compiler wrote before
+    serial_.store(serial, std::memory_order_relaxed);
     return wire::Status::done;
   }
 
-  Asked follow(std::uint32_t periods) {
-    const std::uint32_t serial = serial_.load(std::memory_order_acquire);
+  /// Call once a tick, before the two below.
+  void follow(std::uint32_t periods) {
+    const std::uint32_t serial = serial_.load(std::memory_order_relaxed);
     if (serial != seen_) {
       seen_ = serial;
       age_periods_ = 0;
       share_ = 1.0f;
-    } else if (share_ > 0.0f) {
+    } else {
       age_periods_ += periods;
-      if (age_periods_ >= timeout_periods_) return fade(periods);
+      if (age_periods_ >= timeout_periods_) [[unlikely]]
+        fade(periods);
     }
-    const Dq& asked_A = slots_[seen_ & 1];
-    return {{asked_A.d * share_, asked_A.q * share_}, share_ > 0.0f, false};
   }
+
+  const Dq& current_A() const { return slots_[seen_ & 1]; }
+  /// Of the current that is still asked for: 1, fading, or 0 when the setpoint is gone and the bridge may open.
+  float share() const { return share_; }
 
   /// Forgets whatever was asked until now: only what comes later counts.
   void discard() {
-    seen_ = serial_.load(std::memory_order_acquire);
+    seen_ = serial_.load(std::memory_order_relaxed);
     share_ = 0.0f;
   }
 
   bool is_zero() const {
-    const Dq& last_A = slots_[serial_.load(std::memory_order_acquire) & 1];
+    const Dq& last_A = slots_[serial_.load(std::memory_order_relaxed) & 1];
     return last_A.d == 0.0f && last_A.q == 0.0f;
   }
 
  private:
   static bool within(float x_A) { return x_A >= -largest_setpoint_A && x_A <= largest_setpoint_A; }
 
-  Asked fade(std::uint32_t periods) {
+  void fade(std::uint32_t periods) {
+    age_periods_ = timeout_periods_;  // stays old without ever wrapping
     share_ -= fade_per_period_ * static_cast<float>(periods);
     if (!(share_ > 0.0f)) share_ = 0.0f;
-    const Dq& asked_A = slots_[seen_ & 1];
-    return {{asked_A.d * share_, asked_A.q * share_}, share_ > 0.0f, true};
   }
 
   std::uint32_t timeout_periods_ = 0;
