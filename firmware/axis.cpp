@@ -27,13 +27,13 @@ thermal::HeatSet<double> usable_or_nothing(const thermal::HeatSet<double>& set) 
   nothing.links[0] = {0, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, 1.0, 0.0};
   return nothing;
 }
+}  // namespace
 
 thermal::GovernorSettings governor_settings(const BoardRating& rating) {
   thermal::GovernorSettings settings;
   settings.max_A = rating.peak_A;
   return settings;
 }
-}  // namespace
 
 Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating)
     : core_(usable_or_nothing(setup.heat), setup.estimator),
@@ -273,8 +273,6 @@ Allowance Axis::permitted_by(const thermal::Allowance& core, const Allowance& bo
   lower(blind_cap_A_, wire::Limit::blind);
   return least;
 }
-
-float Axis::current2_A2() const { return static_cast<float>(input_[thermal::Drive::current_A2]); }
 
 void Axis::publish() {
   const thermal::Estimate& now = core_.estimate();

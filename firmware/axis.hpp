@@ -67,6 +67,9 @@ struct AxisState {
   FaultRecord fault;
 };
 
+/// The governor's settings on this board.
+thermal::GovernorSettings governor_settings(const BoardRating& rating);
+
 class Axis {
  public:
   Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating);
@@ -98,8 +101,9 @@ class Axis {
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
-  const thermal::Estimate& estimate() const { return core_.estimate(); }
-  float current2_A2() const;  // mean of |i|^2 over the last slow tick, ripple included: what heats the power stage
+  const thermal::CoreEstimator& core() const { return core_; }
+  /// Mean of |i|^2 over the last slow tick, ripple included: what heats the power stage.
+  double current2_A2() const { return input_[thermal::Drive::current_A2]; }
 
  private:
   enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4 };

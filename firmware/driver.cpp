@@ -3,11 +3,24 @@
 
 namespace firmware {
 
-Driver::Driver(const DriverSetup& setup)
-    : peak_A_(setup.rating.peak_A), axes_{{0, setup.axes[0], setup.rating}, {1, setup.axes[1], setup.rating}} {}
+namespace {
+thermal::BoardRating heat_of(const DriverSetup& setup) {
+  thermal::BoardRating heat = setup.board_heat;
+  heat.continuous_A = setup.rating.continuous_A;
+  return heat;
+}
+}  // namespace
 
-void Driver::slow_tick(const hal::BoardSlowSample&, const hal::AxisSlowSample (&axes)[axis_count]) {
-  for (int i = 0; i < axis_count; ++i) axes_[i].slow_tick(axes[i], {peak_A_, wire::Limit::board_hot});
+Driver::Driver(const DriverSetup& setup)
+    : governor_(governor_settings(setup.rating)),
+      board_heat_(heat_of(setup)),
+      axes_{{0, setup.axes[0], setup.rating}, {1, setup.axes[1], setup.rating}} {}
+
+void Driver::slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]) {
+  const double used_A2[axis_count] = {axes_[0].current2_A2(), axes_[1].current2_A2()};  // of the last slow tick
+  board_heat_.tick(used_A2[0], used_A2[1], {board.power_stage.value_degC, board.power_stage.valid});
+  for (int i = 0; i < axis_count; ++i)
+    axes_[i].slow_tick(axes[i], {board_heat_.allowed_A(used_A2[1 - i], governor_), wire::Limit::board_hot});
 }
 
 }  // namespace firmware

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "firmware/axis.hpp"
+#include "thermal/board_heat.hpp"
 
 namespace firmware {
 
@@ -13,6 +14,7 @@ inline constexpr int axis_count = 2;
 struct DriverSetup {
   BoardRating rating;
   AxisSetup axes[axis_count];
+  thermal::BoardRating board_heat{};  // its continuous current is taken from the rating
 };
 
 class Driver {
@@ -24,9 +26,11 @@ class Driver {
 
   /// Every 10 ms, from one context below the control interrupt.
   void slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]);
+  const thermal::BoardHeat& board_heat() const { return board_heat_; }
 
  private:
-  float peak_A_;
+  thermal::GovernorSettings governor_;
+  thermal::BoardHeat board_heat_;
   Axis axes_[axis_count];
 };
 

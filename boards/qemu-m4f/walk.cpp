@@ -44,9 +44,9 @@ void print(const firmware::Axis& axis) {
   for (const float x : {s.fast.current_A.d, s.fast.current_A.q, s.fast.voltage_V.q, s.fast.rad_per_s, s.allowance_A,
                         s.core_sigma_K, s.fault.value, s.fault.age_s})
     print(x);
-  for (int i = 0; i < axis.estimate().node_count; ++i) {
+  for (int i = 0; i < axis.core().estimate().node_count; ++i) {
     console::write(" ");
-    console::write_hex(std::bit_cast<std::uint64_t>(axis.estimate().degC[i]), 16);
+    console::write_hex(std::bit_cast<std::uint64_t>(axis.core().estimate().degC[i]), 16);
   }
 }
 
