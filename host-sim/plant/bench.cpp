@@ -39,7 +39,10 @@ Bench::Axis::Axis(const BenchDesign& design, const AxisDesign& axis, std::uint64
       hidden(axis.hidden),
       phase_ohm{} {
   stove.soak(design.start_degC);
-  stove.around.ambient_degC = stove.around.coolant_degC = stove.around.neighbour_degC = design.ambient_degC;
+  stove.around = {.ambient_degC = design.ambient_degC,
+                  .coolant_degC = design.ambient_degC,
+                  .neighbour_degC = design.ambient_degC,
+                  .frame_degC = design.ambient_degC};
 }
 
 Bench::Bench(const BenchDesign& design, std::uint64_t seed)

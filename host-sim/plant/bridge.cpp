@@ -5,6 +5,12 @@
 #include <cmath>
 
 namespace host_sim {
+namespace {
+
+/// A switched period is cut into at least this many steps, so that a step is short beside L/R.
+constexpr int pieces = 8;
+
+}  // namespace
 
 /// The flux error of each phase is piecewise linear over half a period (000, one upper, two uppers, 111), starts and
 /// ends at zero and is antisymmetric in the other half; a segment from a to b contributes (a^2 + ab + b^2)/3 of its
@@ -41,14 +47,15 @@ void Bridge::advance(Motor& motor, const hal::Duty& duty, double bus_V, const st
       motor.step(period_s, {0, 0, 0}, 7, false);  // at rest or slow: no diode can open
       return;
     }
-    for (int part = 0; part < 8; ++part) segment(motor, period_s / 8, {Gate::off, Gate::off, Gate::off}, bus_V);
+    for (int part = 0; part < 8; ++part)
+      segment(motor, period_s / 8, {Gate::off, Gate::off, Gate::off}, bus_V, winding_ohm);
     return;
   }
   const std::array<double, 3> ratio = {std::clamp(static_cast<double>(duty.ratio.a), 0.0, 1.0),
                                        std::clamp(static_cast<double>(duty.ratio.b), 0.0, 1.0),
                                        std::clamp(static_cast<double>(duty.ratio.c), 0.0, 1.0)};
   if (design_.switched) {
-    switched(motor, ratio, bus_V);
+    switched(motor, ratio, bus_V, winding_ohm);
   } else {
     averaged(motor, ratio, bus_V, winding_ohm);
   }
@@ -86,21 +93,17 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
   for (int k = 0; k < 3; ++k) {
     const double ripple_A2 = share[k] * unit_A * unit_A;
     squared_A2 += ripple_A2;
-    const double heat_J = ripple_A2 * winding_ohm[k] * period_s,
-                 series_J = ripple_A2 * design_.on_resistance_ohm * period_s;
-    work_.ripple_A2s[k] += ripple_A2 * period_s;
-    work_.ripple_J[k] += heat_J;
-    work_.ripple_series_J += series_J;
-    work_.bus_J += heat_J + series_J;
+    charge_ripple(k, ripple_A2 * period_s, winding_ohm[k]);
   }
   soft_A_ = 1e-3 + std::sqrt(squared_A2);  // peak of a triangle: sqrt(3) of its rms; squared_A2 sums three phases
 }
 
-void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V) {
+void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
+                      const std::array<double, 3>& winding_ohm) {
   const double period_s = 1 / design_.pwm_Hz;
-  std::array<double, 24> edge_s;
+  std::array<double, pieces + 12> edge_s;
   int edges = 0;
-  for (int part = 1; part <= 8; ++part) edge_s[edges++] = period_s * part / 8;  // keeps long segments accurate
+  for (int part = 1; part <= pieces; ++part) edge_s[edges++] = period_s * part / pieces;
   std::array<double, 3> rise_s, fall_s;
   for (int k = 0; k < 3; ++k) {
     rise_s[k] = 0.5 * (1 - ratio[k]) * period_s;
@@ -129,14 +132,15 @@ void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double b
         gates[k] = Gate::off;
       }
     }
-    segment(motor, h_s, gates, bus_V);
+    segment(motor, h_s, gates, bus_V, winding_ohm);
     now_s = edge_s[e];
   }
 }
 
 /// A stretch with constant gates. Where both switches of a phase are off its current chooses the diode; a diode whose
 /// current reaches zero stops, and a floating lead that leaves the rails starts one.
-void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V) {
+void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V,
+                     const std::array<double, 3>& winding_ohm) {
   double left_s = h_s;
   for (int split = 0; split < 7 && left_s > 0; ++split) {  // each phase can stop and start a diode once; then go on
     const std::array<double, 3> current_A = motor.current_A();
@@ -223,10 +227,24 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
       if (at_upper[k]) work_.bus_J += step_s * bus_V * mean_A[k];
       if (diode[k] != 0) work_.heat_J -= step_s * design_.diode_V * diode[k] * mean_A[k];
     }
+    // The motor heats by the mean current of the step; a ramp from a to b has (b - a)^2/12 more mean square.
+    const std::array<double, 3> end_A = motor.current_A();
+    for (int k = 0; k < 3; ++k) {
+      const double more_A2s = (end_A[k] - current_A[k]) * (end_A[k] - current_A[k]) / 12 * step_s;
+      charge_ripple(k, more_A2s, winding_ohm[k]);
+    }
     if (stopped >= 0) motor.extinguish(stopped);
     left_s -= step_s;
     if (left_s < 1e-12) break;
   }
+}
+
+void Bridge::charge_ripple(int phase, double squared_A2s, double winding_ohm) {
+  const double heat_J = squared_A2s * winding_ohm, series_J = squared_A2s * design_.on_resistance_ohm;
+  work_.ripple_A2s[phase] += squared_A2s;
+  work_.ripple_J[phase] += heat_J;
+  work_.ripple_series_J += series_J;
+  work_.bus_J += heat_J + series_J;
 }
 
 /// Overlap of voltage and current at the edges.

@@ -27,8 +27,9 @@ struct BridgeDesign {
 /// Joules since construction. Out of the bus = into the motor + heat + ripple + short.
 struct BridgeWork {
   double bus_J = 0;
-  double heat_J = 0;                   // switches and diodes; the resistive part is the motor's series_J
-  std::array<double, 3> ripple_J{};    // averaged bridge: copper heat of the ripple that the motor did not see
+  double heat_J = 0;  // switches and diodes; the resistive part is the motor's series_J
+  std::array<double, 3>
+      ripple_J{};  // copper heat of ripple inside a step, which the motor's mean current does not show
   std::array<double, 3> ripple_A2s{};  // the same as integral of squared current
   double ripple_series_J = 0;          // ripple in the on-resistance
   double short_J = 0;                  // in a shorted pair of leads
@@ -58,8 +59,11 @@ class Bridge {
   enum class Gate { upper, lower, off };
   void averaged(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
                 const std::array<double, 3>& winding_ohm);
-  void switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V);
-  void segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V);
+  void switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
+                const std::array<double, 3>& winding_ohm);
+  void segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V,
+               const std::array<double, 3>& winding_ohm);
+  void charge_ripple(int phase, double squared_A2s, double winding_ohm);
   void charge_edges(const Motor& motor, const std::array<double, 3>& ratio, double bus_V);
   void carry_short(const std::array<double, 3>& ratio, double bus_V);
 

@@ -30,9 +30,8 @@ struct HiddenEffects {
   double radiation_W_per_K = 0;          // at 300 K, housing to ambient
   double cooling_change = 1;             // R2 times this from cooling_change_s on
   double cooling_change_s = 0;
-  double neighbour_W_per_K = 0;  // housing to the other motor's housing
-  double frame_W_per_K = 0;      // housing to a frame at frame_degC
-  double frame_degC = 25;
+  double neighbour_W_per_K = 0;      // housing to the other motor's housing
+  double frame_W_per_K = 0;          // housing to what the motor is mounted on (Surroundings::frame_degC)
   double ambient_drift_K_per_s = 0;  // true ambient leaves the one that is believed
   // More masses.
   double third_mass_J_per_K = 0;  // on the housing

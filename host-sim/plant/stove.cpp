@@ -163,7 +163,7 @@ Stove::Flow Stove::flow(const Vector& T, const Vector& heat_W) const {
   const double frame_air_W = air_W(frame, d_.frame_to_ambient_W_per_K);
   double more_W = d_.housing_to_coolant_W_per_K * (T[housing] - around.coolant_degC) +
                   hidden_.neighbour_W_per_K * (T[housing] - around.neighbour_degC) +
-                  hidden_.frame_W_per_K * (T[housing] - hidden_.frame_degC);
+                  hidden_.frame_W_per_K * (T[housing] - around.frame_degC);
   const double radiation = d_.radiation_W_per_K + hidden_.radiation_W_per_K;
   if (radiation > 0) {
     const double hot_K = T[housing] - absolute_zero_degC, cold_K = ambient_degC_ - absolute_zero_degC;

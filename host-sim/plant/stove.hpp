@@ -33,8 +33,9 @@ struct HeatDrive {
 struct Surroundings {
   double ambient_degC = 25;
   double coolant_degC = 25;
-  double neighbour_degC = 25;
-  double cooling = 1;  // factor on both ways to ambient: 0.5 = R2 doubled
+  double neighbour_degC = 25;  // housing of the other motor
+  double frame_degC = 25;      // what the motor is mounted on
+  double cooling = 1;          // factor on both ways to ambient: 0.5 = R2 doubled
 };
 
 class Stove {
