@@ -1,22 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include "boards/host/board.hpp"
 
+#include <cmath>
 #include <numbers>
 
 namespace boards::host {
 
 hal::AxisSample AxisDoor::sample() noexcept {
-  const host_sim::SensorDesign& design = bench_->sensor_design();
-  const host_sim::AxisRaw raw = bench_->raw(axis_);
-  const auto ampere = [&](int phase) {
-    return static_cast<float>((raw.current[phase] - design.current_zero_counts) * design.current_A_per_count);
+  const host_sim::AxisRaw& raw = bench_->raw(axis_);
+  bool valid = true;
+  const auto ampere = [&](std::uint16_t counts) {
+    valid = valid && counts > 0 && counts < design_->adc_full_scale;  // at a rail the current may be anything
+    return static_cast<float>((counts - design_->current_zero_counts) * design_->current_A_per_count);
   };
-  const auto at_rail = [&](int phase) { return raw.current[phase] == 0 || raw.current[phase] >= design.adc_full_scale; };
-  return {.current_A = {ampere(0), ampere(1), ampere(2)},
-          .bus_V = static_cast<float>(raw.bus_voltage * design.bus_V_per_count),
-          .rotor_rad = static_cast<float>(raw.encoder * (2 * std::numbers::pi / design.encoder_counts_per_turn)),
+  const wire::Abc current_A = {ampere(raw.current_counts[0]), ampere(raw.current_counts[1]), ampere(raw.current_counts[2])};
+  const int position = raw.encoder_counts % design_->encoder_counts_per_turn;
+  return {.current_A = current_A,
+          .bus_V = static_cast<float>(bench_->board_raw().bus_voltage_counts * design_->bus_V_per_count),
+          .rotor_rad = static_cast<float>(position * (2 * std::numbers::pi / design_->encoder_counts_per_turn)),
           .sequence = raw.sequence,
-          .valid = !at_rail(0) && !at_rail(1) && !at_rail(2)};
+          .valid = valid};
 }
 
 hal::Temperature thermistor(std::uint16_t counts, const host_sim::NtcDesign& design, int full_scale) {
@@ -28,17 +31,14 @@ hal::Temperature thermistor(std::uint16_t counts, const host_sim::NtcDesign& des
   return {static_cast<float>(1 / per_K - 273.15), true};
 }
 
-hal::AxisSlowSample slow_sample(host_sim::Bench& bench, int axis) {
-  const host_sim::SensorDesign& design = bench.sensor_design();
-  return {thermistor(bench.raw_slow(axis).housing, design.housing, design.adc_full_scale)};
+hal::AxisSlowSample slow_sample(const host_sim::AxisRaw& raw, const host_sim::SensorDesign& design) {
+  return {thermistor(raw.housing_counts, design.housing, design.adc_full_scale)};
 }
 
-hal::BoardSlowSample slow_sample(host_sim::Bench& bench) {
-  const host_sim::SensorDesign& design = bench.sensor_design();
-  const host_sim::BoardRaw raw = bench.raw_board();
-  const bool on_scale = raw.bus_current > 0 && raw.bus_current < design.adc_full_scale;
-  return {.power_stage = thermistor(raw.power_stage, design.power_stage, design.adc_full_scale),
-          .bus_A = static_cast<float>((raw.bus_current - design.bus_zero_counts) * design.bus_A_per_count),
+hal::BoardSlowSample slow_sample(const host_sim::BoardRaw& raw, const host_sim::SensorDesign& design) {
+  const bool on_scale = raw.bus_current_counts > 0 && raw.bus_current_counts < design.adc_full_scale;
+  return {.power_stage = thermistor(raw.power_stage_counts, design.power_stage, design.adc_full_scale),
+          .bus_A = static_cast<float>((raw.bus_current_counts - design.bus_zero_counts) * design.bus_A_per_count),
           .bus_A_valid = on_scale};
 }
 

@@ -6,11 +6,11 @@
 
 namespace boards::host {
 
-double optimal_impulse_As(const Scene& scene, const TwoNodes& m, double most_A) {
+double optimal_impulse_As(const Scene& scene, const wire::Motor& m, double most_A) {
   // Euler at 10 us: the fastest winding of the table has a second; the error is below 0.001 % of the impulse.
   constexpr double step_s = 1e-5;
   double T1_degC = scene.start_degC, T2_degC = scene.start_degC, impulse_As = 0;
-  const double loss_per_A2 = 3 * m.hot_phase_share * m.phase_resistance_ohm;
+  const double loss_per_A2 = 1.5 * m.phase_resistance_ohm;
   for (double t_s = 0; t_s < scene.seconds; t_s += step_s) {
     const double resistance_ratio = 1 + m.copper_coefficient_per_K * (T1_degC - 25);
     const double outflow_W = (T1_degC - T2_degC) / m.R1_K_per_W;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "boards/host/board.hpp"
+#include "boards/dual_48v_20a.hpp"
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
@@ -17,9 +18,10 @@ namespace boards::host {
 namespace {
 
 constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;  // direct current that heats like a phase amplitude of 1 A
-constexpr double comparison_limit_degC = 1000;             // for limiters that must do without the governor
+constexpr double no_limit_degC = 1000;    // for limiters that must do without the governor
 constexpr double restart_K = 10;                           // a cut limiter comes back this far below its limit
 constexpr int setpoint_periods = 20;                       // the robot's computer speaks every millisecond
+constexpr long progress_periods = 20000;                // a simulated second
 constexpr double warm_up_s = 0.05;                         // offset learning before the scene's own time starts
 
 /// What stands between the demand and the firmware.
@@ -89,5 +91,209 @@ double imposed_speed_rad_per_s(const Shaft& shaft, double time_s) {
          shaft.speed_amplitude_rad_per_s * std::sin(2 * std::numbers::pi * shaft.frequency_Hz * time_s);
 }
 
+double hottest_degC(const firmware::AxisState& state) {
+  return static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
+}
+
+firmware::BoardRating rating_of(const std::string& board) {
+  return board == "h8-17.5d" ? dual_48V_80A : dual_48V_20A;  // scene.cpp lets no other name through
+}
+
+host_sim::HeatOptions heat_options(const Scene& scene) {
+  host_sim::HeatOptions options;
+  options.coolant_R2_K_per_W = scene.coolant_K_per_W;
+  return options;
+}
+
+/// One board with its motors, and the firmware on it.
+class Board {
+ public:
+  Board(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file, const RunOptions& options)
+      : scene_(scene),
+        limiter_(limiter),
+        file_(file),
+        design_(plant(scene, file, options)),
+        bench_(design_, scene.seed),
+        doors_{AxisDoor(bench_, design_.sensors, 0), AxisDoor(bench_, design_.sensors, 1)},
+        driver_(setup(scene, limiter, file, design_)) {
+    for (int axis = 0; axis < firmware::axis_count; ++axis) {
+      bench_.load(axis) = load_of(scene.shaft);
+      bench_.motor(axis).place(scene.shaft.angle_rad / file.motor.pole_pairs, 0);
+    }
+  }
+
+  std::vector<Trace> play(const std::function<void(double)>& progress);
+
+ private:
+  static host_sim::BenchDesign plant(const Scene& scene, const wire::pc::MotorFile& file, const RunOptions& options);
+  static firmware::DriverSetup setup(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file,
+                                     const host_sim::BenchDesign& design);
+  void period();
+  void speak(const Trace& trace, Wish& wish, double time_s);
+  void slow_tick();
+  Row row(int axis, double time_s, double demand) const;
+
+  const Scene& scene_;
+  Limiter limiter_;
+  const wire::pc::MotorFile& file_;
+  host_sim::BenchDesign design_;
+  host_sim::Bench bench_;
+  AxisDoor doors_[2];
+  firmware::Driver driver_;
+  long periods_ = 0;
+};
+
+host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile& file, const RunOptions& options) {
+  host_sim::BenchDesign design;
+  for (host_sim::AxisDesign& axis : design.axes) {
+    axis = host_sim::axis_from_sheet(file.motor, heat_options(scene));
+    axis.hidden = options.hidden;
+  }
+  const firmware::BoardRating rating = rating_of(scene.board);
+  design.bridge.pwm_Hz = static_cast<double>(rating.pwm_Hz);
+  design.bridge.dead_time_s = static_cast<double>(rating.dead_time_s);
+  const double larger = static_cast<double>(rating.peak_A / dual_48V_20A.peak_A);
+  design.sensors.current_A_per_count *= larger;
+  design.sensors.bus_A_per_count *= larger;
+  design.supply.open_V = scene.supply_V;
+  design.start_degC = scene.start_degC;
+  design.ambient_degC = scene.ambient_degC;
+  return design;
+}
+
+firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file,
+                                   const host_sim::BenchDesign& design) {
+  wire::Motor known = host_sim::true_sheet(file.motor, design.axes[0].heat);
+  if (limiter != Limiter::governor) known.winding_max_degC = no_limit_degC;
+  const firmware::BoardRating rating = rating_of(scene.board);
+  firmware::AxisSetup axis;
+  axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
+  axis.heat = thermal::three_phase_set(known);
+  axis.estimator.trust = scene.trust == "sheet" ? thermal::sheet_trust
+                         : scene.trust == "identified" ? thermal::identified_trust : thermal::exact_trust;
+  return {rating, {axis, axis}};
+}
+
+void Board::period() {
+  const double time_s = static_cast<double>(periods_) * bench_.period_s() - warm_up_s;
+  std::array<hal::Duty, 2> duty;
+  for (std::size_t axis = 0; axis < duty.size(); ++axis) {
+    const int index = static_cast<int>(axis);
+    duty[axis] = doors_[axis].next();
+    doors_[axis].drive(driver_.axis(index).tick(doors_[axis].sample()));
+    if (scene_.shaft.kind == Shaft::Kind::imposed) {
+      bench_.load(index).speed_rad_per_s = imposed_speed_rad_per_s(scene_.shaft, time_s);
+    }
+  }
+  bench_.advance_period(duty);
+  ++periods_;
+}
+
+void Board::speak(const Trace& trace, Wish& wish, double time_s) {
+  firmware::Axis& axis = driver_.axis(trace.axis);
+  const hal::Temperature housing = slow_sample(bench_.raw(trace.axis), design_.sensors).housing;
+  const double wish_A = wish.amperes(demand_A(scene_, trace.axis, time_s), hottest_degC(axis.state()), housing);
+  (void)axis.set_current({0.0f, static_cast<float>(wish_A)});  // a refused setpoint shows in the trace as old
+}
+
+void Board::slow_tick() {
+  driver_.slow_tick(slow_sample(bench_.board_raw(), design_.sensors),
+                    {slow_sample(bench_.raw(0), design_.sensors), slow_sample(bench_.raw(1), design_.sensors)});
+}
+
+Row Board::row(int axis, double time_s, double demand) const {
+  const firmware::AxisState& state = driver_.axis(axis).state();
+  const firmware::FastView& fast = driver_.axis(axis).fast();
+  const host_sim::AxisTruth truth = bench_.truth(axis);
+  Row row{};
+  row.time_s = time_s;
+  row.demand_A = demand;
+  row.allowance_A = static_cast<double>(state.allowance_A);
+  row.id_A = static_cast<double>(fast.current_A.d);
+  row.iq_A = static_cast<double>(fast.current_A.q);
+  row.bus_A = static_cast<double>(slow_sample(bench_.board_raw(), design_.sensors).bus_A);
+  row.estimated_core_degC = hottest_degC(state);
+  row.core_sigma_K = static_cast<double>(state.core_sigma_K);
+  row.true_core_degC = truth.hottest_degC;
+  row.housing_degC = static_cast<double>(slow_sample(bench_.raw(axis), design_.sensors).housing.value_degC);
+  row.true_housing_degC = truth.housing_degC;
+  row.ambient_degC = scene_.ambient_degC;
+  row.limit = state.limit;
+  row.fault = driver_.axis(axis).fault().fault;
+  return row;
+}
+
+std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
+  const double period_s = bench_.period_s();
+  const auto periods_in = [&](double seconds) { return std::lround(seconds / period_s); };
+  const long slow_periods = periods_in(static_cast<double>(firmware::slow_tick_s)), warm_up = periods_in(warm_up_s);
+  const long total = warm_up + periods_in(scene_.seconds), log_periods = std::max(1L, periods_in(1 / scene_.log_Hz));
+  const bool two_axes =
+      std::any_of(scene_.demands.begin(), scene_.demands.end(), [](const Demand& d) { return d.axis == 1; });
+
+  std::vector<Trace> traces;
+  std::vector<Wish> wishes;
+  std::vector<Sums> sums(2);
+  for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis) {
+    traces.push_back({limiter_, axis, {}});
+    wishes.emplace_back(scene_, limiter_, file_);
+  }
+  while (periods_ < total) {
+    const double time_s = static_cast<double>(periods_ - warm_up) * period_s;
+    for (std::size_t i = 0; i < traces.size(); ++i) {
+      if (periods_ == warm_up) (void)driver_.axis(traces[i].axis).arm();
+      if (periods_ > warm_up && periods_ % setpoint_periods == 0) speak(traces[i], wishes[i], time_s);
+    }
+    period();
+    if (periods_ % slow_periods == 0) slow_tick();
+    if (periods_ <= warm_up) continue;
+
+    for (std::size_t i = 0; i < traces.size(); ++i) {
+      Trace& trace = traces[i];
+      const host_sim::AxisTruth truth = bench_.truth(trace.axis);
+      const double demand = demand_A(scene_, trace.axis, time_s);
+      sums[i].add(driver_.axis(trace.axis).fast(), truth);
+      trace.hottest_true_degC = std::max(trace.hottest_true_degC, truth.hottest_degC);
+      trace.peak_shaft_W = std::max(trace.peak_shaft_W, truth.shaft_W);
+      if (demand != 0) trace.impulse_As += std::hypot(truth.current_d_A, truth.current_q_A) * period_s;
+      if ((periods_ - warm_up) % log_periods == 0) {
+        Row line = row(trace.axis, time_s, demand);
+        sums[i].write(line);
+        trace.rows.push_back(line);
+      }
+    }
+    if (progress && periods_ % progress_periods == 0) progress(static_cast<double>(periods_) / static_cast<double>(total));
+  }
+  return traces;
+}
+
 }  // namespace
+
+Result run_scene(const Scene& scene, const RunOptions& options) {
+  const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, options.motor_folder);
+  Result result{.scene = scene,
+                .motor_name = file.name,
+                .surrogate = file.surrogate,
+                .winding_max_degC = file.motor.winding_max_degC,
+                .optimal_impulse_As = 0};
+
+  if (scene.shaft.kind != Shaft::Kind::locked) {
+    const wire::Motor known = host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
+    result.optimal_impulse_As = optimal_impulse_As(scene, known, static_cast<double>(rating_of(scene.board).peak_A));
+  }
+
+  const std::clock_t start = std::clock();
+  for (std::size_t i = 0; i < scene.limiters.size(); ++i) {
+    std::function<void(double)> share;
+    if (options.progress) {
+      share = [&, i](double done) { options.progress((static_cast<double>(i) + done) / static_cast<double>(scene.limiters.size())); };
+    }
+    Board board(scene, scene.limiters[i], file, options);
+    for (Trace& trace : board.play(share)) result.traces.push_back(std::move(trace));
+    result.simulated_s += scene.seconds;
+  }
+  result.cpu_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  return result;
+}
+
 }  // namespace boards::host

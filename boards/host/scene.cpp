@@ -76,7 +76,7 @@ struct Reader {
 
   Slots top() {
     Scene& s = scene;
-    return {{{"title", &s.title}, {"note", &s.note}, {"motor", &s.motor}, {"board", &s.board}},
+    return {{{"title", &s.title}, {"note", &s.note}, {"motor", &s.motor}, {"board", &s.board}, {"trust", &s.trust}},
             {{"seconds", {&s.seconds, 1e-3, day_s}},
              {"log_Hz", {&s.log_Hz, 0.1, 20000}},
              {"seed", {&seed, 0, 4294967295.0}},
@@ -192,6 +192,11 @@ std::string find_file(const std::string& which, const std::string& folder) {
   refuse(fmt::format("Unknown scene '{}'{} Scenes: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
 }
 
+void expect_one_of(const char* key, const std::string& value, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+  refuse(fmt::format("{} = '{}' is not one of {}.", key, value, fmt::join(known, ", ")));
+}
+
 }  // namespace
 
 const char* name_of(Limiter limiter) {
@@ -227,6 +232,8 @@ Scene read_scene(const std::string& which, const std::string& folder, const std:
   if (const toml::array* list = table["demand"].as_array()) reader.read_demands(path, *list);
   if (const toml::table* shaft = table["shaft"].as_table()) reader.read_shaft(path + ": shaft", *shaft);
   for (const std::string& text : overrides) reader.apply(text);
+  expect_one_of("board", reader.scene.board, {"h8-15d", "h8-17.5d"});
+  expect_one_of("trust", reader.scene.trust, {"exact", "identified", "sheet"});
   reader.scene.seed = static_cast<unsigned>(reader.seed);
   return reader.scene;
 }

@@ -42,6 +42,7 @@ struct Scene {
   std::string id, title, note;
   std::string motor = "ec-16-40w";
   std::string board = "h8-15d";  // rating of the power stage: h8-15d or h8-17.5d
+  std::string trust = "exact";       // in the motor's thermal values: exact (the simulated motor's own), identified, sheet
   double seconds = 1;
   double log_Hz = 1000;
   unsigned seed = 1;

@@ -67,7 +67,13 @@ TEST(Optimum, ReachesTheLimitThenHoldsItsCurrent) {
   scene.seconds = 1;
   scene.demands = {Demand{0, 0, 1, 20, 0, 0}};
   // No copper coefficient and a housing that cannot warm: T1 = Ta + P R1 (1 - exp(-t / tau)) has a closed form.
-  const boards::host::TwoNodes motor{1, 1e9, 1, 1e12, 0.5, 0, 125, 0.5};
+  wire::Motor motor{};
+  motor.phase_resistance_ohm = 0.5;
+  motor.R1_K_per_W = 1;
+  motor.R2_K_per_W = 1e9;
+  motor.C1_J_per_K = 1;
+  motor.C2_J_per_K = 1e12;
+  motor.winding_max_degC = 125;
   const double hold_A = std::sqrt(100 / 0.75), reach_s = -std::log(1 - 100 / (0.75 * 400));
   EXPECT_NEAR(boards::host::optimal_impulse_As(scene, motor, 100), 20 * reach_s + hold_A * (1 - reach_s), 2e-3);
   EXPECT_NEAR(boards::host::optimal_impulse_As(scene, motor, 5), 5, 1e-3);

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// The program host-sim: plays scenes on simulated boards, draws the paper's figures, records logs.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#ifdef HOTCORE_TRAP_FLOATS
+#include <cfenv>
+#endif
+
+#include "boards/host/run_scene.hpp"
+#include "boards/host/scene.hpp"
+#include "boards/host/trace.hpp"
+#include "wire/pc/files.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace {
+
+using namespace boards::host;
+
+const std::string root = HOTCORE_SOURCE_DIR;
+const std::string motor_folder = root + "/boards/motors", scene_folder = root + "/host-sim/scenes";
+
+constexpr const char* examples =
+    "Examples:\n"
+    "  host-sim run jump                         the scene, its log and its picture below ./out/jump\n"
+    "  host-sim run stall --set shaft.angle_rad=0.5 --set seed=7\n"
+    "  host-sim run jump --set trust=sheet       what not knowing the motor costs\n"
+    "  host-sim list                             scenes and motors\n"
+    "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
+
+/// Shows how far a run is, on the terminal and only if it lasts.
+class Progress {
+ public:
+  explicit Progress(const std::string& what) : what_(what) {}
+  ~Progress() {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
+  void operator()(double share) {
+    if (isatty(STDERR_FILENO) == 0) return;
+    fmt::print(stderr, "\r  {} {:3.0f} %", what_, 100 * share);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+
+ private:
+  std::string what_;
+  bool shown_ = false;
+};
+
+void run(const std::string& name, const std::vector<std::string>& overrides, const std::string& out, bool json) {
+  const Scene scene = read_scene(name, scene_folder, overrides);
+  Result result;
+  {
+    Progress progress(scene.id);
+    result = run_scene(scene, {.motor_folder = motor_folder, .progress = [&](double share) { progress(share); }});
+  }
+  const std::string folder = out + "/" + scene.id;
+  for (const Trace& trace : result.traces) {
+    const std::string axis = trace.axis == 0 ? "" : "-axis1";
+    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), axis), csv(result, trace));
+  }
+  draw(result, fmt::format("{}/{}.svg", folder, scene.id));
+  if (json) fmt::print("{}", summary_json(result));
+  else fmt::print("{}  picture: {}/{}.svg, logs: {}/*.csv\n", summary_text(result), folder, scene.id, folder);
+}
+
+void list() {
+  fmt::print("Scenes ({}):\n", scene_folder);
+  for (const std::string& name : scene_names(scene_folder)) fmt::print("  {:<16}{}\n", name, read_scene(name, scene_folder, {}).title);
+  fmt::print("Motors ({}):\n", motor_folder);
+  for (const std::string& name : wire::pc::motor_names(motor_folder)) {
+    const wire::pc::MotorFile file = wire::pc::read_motor(name, motor_folder);
+    fmt::print("  {:<24}{}{}\n", name, file.name, file.surrogate ? " (surrogate)" : "");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+#ifdef HOTCORE_TRAP_FLOATS
+  feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
+#endif
+  CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples), "host-sim"};
+  app.require_subcommand(1);
+  std::string scene, out = "out";
+  std::vector<std::string> overrides;
+  bool json = false;
+
+  CLI::App* run_command = app.add_subcommand("run", "play a scene");
+  run_command->add_option("scene", scene, "a name (see list) or a .toml file")->required();
+  run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")->take_all();
+  run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str();
+  run_command->add_flag("--json", json, "the summary as JSON on standard output");
+
+  CLI::App* list_command = app.add_subcommand("list", "scenes and motors");
+
+  try {
+    app.parse(argc, argv);
+    if (*run_command) run(scene, overrides, out, json);
+    if (*list_command) list();
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const wire::pc::UserError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return error.exit_code();
+  }
+  return 0;
+}
