@@ -14,6 +14,7 @@
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
 #include "wire/pc/files.hpp"
+#include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include "boards/host/run_scene.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <numbers>
 
 #include "boards/host/board.hpp"
-#include "boards/dual_48v_20a.hpp"
+#include "boards/dual_48v_80a.hpp"
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
 #include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
+#include "wire/pc/user_error.hpp"
 
 namespace boards::host {
 namespace {
@@ -22,7 +25,7 @@ constexpr double no_limit_degC = 1000;    // for limiters that must do without t
 constexpr double restart_K = 10;                           // a cut limiter comes back this far below its limit
 constexpr int setpoint_periods = 20;                       // the robot's computer speaks every millisecond
 constexpr long progress_periods = 20000;                // a simulated second
-constexpr double warm_up_s = 0.05;                         // offset learning before the scene's own time starts
+constexpr double warm_up_s = 1;                            // the board has been on for a second: offsets learnt, housing heard
 
 /// What stands between the demand and the firmware.
 class Wish {
@@ -129,6 +132,7 @@ class Board {
   static firmware::DriverSetup setup(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file,
                                      const host_sim::BenchDesign& design);
   void period();
+  void arm(int axis);
   void speak(const Trace& trace, Wish& wish, double time_s);
   void slow_tick();
   Row row(int axis, double time_s, double demand) const;
@@ -189,6 +193,13 @@ void Board::period() {
   ++periods_;
 }
 
+void Board::arm(int axis) {
+  const wire::Status status = driver_.axis(axis).arm();
+  if (status == wire::Status::done) return;
+  const wire::CodeText text = wire::text_of(status);
+  throw wire::pc::UserError(wire::pc::Exit::usage, fmt::format("Axis {} would not arm: {}; {}.", axis, text.happened, text.advice));
+}
+
 void Board::speak(const Trace& trace, Wish& wish, double time_s) {
   firmware::Axis& axis = driver_.axis(trace.axis);
   const hal::Temperature housing = slow_sample(bench_.raw(trace.axis), design_.sensors).housing;
@@ -226,7 +237,7 @@ Row Board::row(int axis, double time_s, double demand) const {
 std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
   const double period_s = bench_.period_s();
   const auto periods_in = [&](double seconds) { return std::lround(seconds / period_s); };
-  const long slow_periods = periods_in(static_cast<double>(firmware::slow_tick_s)), warm_up = periods_in(warm_up_s);
+  const long slow_periods = periods_in(thermal::estimator_dt_s), warm_up = periods_in(warm_up_s);
   const long total = warm_up + periods_in(scene_.seconds), log_periods = std::max(1L, periods_in(1 / scene_.log_Hz));
   const bool two_axes =
       std::any_of(scene_.demands.begin(), scene_.demands.end(), [](const Demand& d) { return d.axis == 1; });
@@ -241,7 +252,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
   while (periods_ < total) {
     const double time_s = static_cast<double>(periods_ - warm_up) * period_s;
     for (std::size_t i = 0; i < traces.size(); ++i) {
-      if (periods_ == warm_up) (void)driver_.axis(traces[i].axis).arm();
+      if (periods_ == warm_up) arm(traces[i].axis);
       if (periods_ > warm_up && periods_ % setpoint_periods == 0) speak(traces[i], wishes[i], time_s);
     }
     period();
@@ -275,7 +286,8 @@ Result run_scene(const Scene& scene, const RunOptions& options) {
                 .motor_name = file.name,
                 .surrogate = file.surrogate,
                 .winding_max_degC = file.motor.winding_max_degC,
-                .optimal_impulse_As = 0};
+                .optimal_impulse_As = 0,
+                .traces = {}};
 
   if (scene.shaft.kind != Shaft::Kind::locked) {
     const wire::Motor known = host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
