@@ -160,6 +160,7 @@ host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile
   design.sensors.current_A_per_count *= larger;
   design.sensors.bus_A_per_count *= larger;
   design.supply.open_V = scene.supply_V;
+  design.supply.can_sink = scene.supply_sinks;
   design.start_degC = scene.start_degC;
   design.ambient_degC = scene.ambient_degC;
   return design;
@@ -185,6 +186,11 @@ void Board::period() {
     const int index = static_cast<int>(axis);
     duty[axis] = doors_[axis].next();
     doors_[axis].drive(driver_.axis(index).tick(doors_[axis].sample()));
+    for (const double landing_s : scene_.shaft.landings_s) {
+      if (periods_ == std::lround((landing_s + warm_up_s) / bench_.period_s())) {
+        bench_.motor(index).place(bench_.motor(index).angle_rad(), 0);
+      }
+    }
     if (scene_.shaft.kind == Shaft::Kind::imposed) {
       bench_.load(index).speed_rad_per_s = imposed_speed_rad_per_s(scene_.shaft, time_s);
     }

@@ -72,7 +72,7 @@ constexpr double day_s = 86400, hottest_degC = 300, most_A = 200;
 
 struct Reader {
   Scene scene;
-  double seed = 1;
+  double seed = 1, supply_sinks = 1;
 
   Slots top() {
     Scene& s = scene;
@@ -84,7 +84,8 @@ struct Reader {
              {"start_degC", {&s.start_degC, -40, hottest_degC}},
              {"housing_limit_degC", {&s.housing_limit_degC, 0, hottest_degC}},
              {"coolant_K_per_W", {&s.coolant_K_per_W, 0, 100}},
-             {"supply_V", {&s.supply_V, 5, 100}}},
+             {"supply_V", {&s.supply_V, 5, 100}},
+             {"supply_sinks", {&supply_sinks, 0, 1}}},
             {"limiters", "demand", "shaft"}};
   }
 
@@ -93,16 +94,18 @@ struct Reader {
     return {{{"kind", kind}},
             {{"angle_rad", {&s.angle_rad, -10, 10}},
              {"load_inertia_kg_m2", {&s.load_inertia_kg_m2, 0, 1}},
-             {"friction_Nm", {&s.friction_Nm, 0, 100}},
-             {"speed_rad_per_s", {&s.speed_rad_per_s, -5000, 5000}},
+              {"speed_rad_per_s", {&s.speed_rad_per_s, -5000, 5000}},
              {"speed_amplitude_rad_per_s", {&s.speed_amplitude_rad_per_s, 0, 5000}},
              {"frequency_Hz", {&s.frequency_Hz, 0, 100}}},
-            {}};
+            {"landings_s"}};
   }
 
   void read_shaft(const std::string& place, const toml::table& table) {
     std::string kind = "locked";
     read_table(place, table, shaft(&kind));
+    if (const toml::array* list = table["landings_s"].as_array()) {
+      for (const toml::node& node : *list) scene.shaft.landings_s.push_back(node.value<double>().value_or(0));
+    }
     if (kind == "locked")
       scene.shaft.kind = Shaft::Kind::locked;
     else if (kind == "free")
@@ -234,6 +237,7 @@ Scene read_scene(const std::string& which, const std::string& folder, const std:
   for (const std::string& text : overrides) reader.apply(text);
   expect_one_of("board", reader.scene.board, {"h8-15d", "h8-17.5d"});
   expect_one_of("trust", reader.scene.trust, {"exact", "identified", "sheet"});
+  reader.scene.supply_sinks = reader.supply_sinks != 0;
   reader.scene.seed = static_cast<unsigned>(reader.seed);
   return reader.scene;
 }

@@ -32,7 +32,7 @@ struct Shaft {
   enum class Kind { locked, free, imposed } kind = Kind::locked;
   double angle_rad = 0;           // electrical angle of a locked rotor
   double load_inertia_kg_m2 = 0;  // of a free shaft, added to the rotor's
-  double friction_Nm = 0;         // of a free shaft, against the motion
+  std::vector<double> landings_s;     // of a free shaft: times at which the load is brought to rest
   double speed_rad_per_s = 0;     // of an imposed motion: mean
   double speed_amplitude_rad_per_s = 0;
   double frequency_Hz = 0;
@@ -51,6 +51,7 @@ struct Scene {
   double housing_limit_degC = 100;  // of the limiter `housing`: what a cautious user of a sensor would set
   double coolant_K_per_W = 0;       // 0: air; otherwise R2 of a water jacket
   double supply_V = 48;
+  bool supply_sinks = true;  // a battery; false: a mains supply that takes nothing back
   std::vector<Limiter> limiters = {Limiter::governor};
   std::vector<Demand> demands;
   Shaft shaft;

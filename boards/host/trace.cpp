@@ -138,7 +138,7 @@ void draw(const Result& result, const std::string& path) {
   };
   const auto all = [&](double Row::*value, bool labelled) {
     std::vector<Curve> curves;
-    for (std::size_t i = 0; i < result.traces.size(); ++i) {
+    for (std::size_t i = result.traces.size(); i-- > 0;) {  // the first limiter, hotcore, is drawn on top
       curves.push_back(curve(i, value, labelled ? label(result, result.traces[i]) : ""));
     }
     return curves;

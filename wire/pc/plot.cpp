@@ -62,6 +62,21 @@ std::string data_block(const std::string& name, const Curve& curve) {
   return out + "EOD\n";
 }
 
+/// From the data and the levels, with air above and below; a level outside the range would be drawn into the neighbour.
+std::pair<double, double> y_range(const Panel& panel) {
+  if (panel.y_min != panel.y_max) return {panel.y_min, panel.y_max};
+  double low = INFINITY, high = -INFINITY;
+  const auto include = [&](double y) {
+    if (std::isfinite(y) && (!panel.log_y || y > 0)) low = std::min(low, y), high = std::max(high, y);
+  };
+  for (const Curve& curve : panel.curves) std::for_each(curve.y.begin(), curve.y.end(), include);
+  for (const Level& level : panel.levels) include(level.y);
+  if (!(low <= high)) return {0, 1};
+  if (panel.log_y) return {low / 1.15, high * 1.15};
+  const double air = high > low ? 0.07 * (high - low) : 1;
+  return {low - air, high + air};
+}
+
 std::string script(const Picture& picture, const std::string& output) {
   const int panels = static_cast<int>(picture.panels.size());
   const int height = head_height + panels * panel_height + foot_height;
@@ -103,8 +118,8 @@ std::string script(const Picture& picture, const std::string& output) {
     s += panel.title.empty() ? "unset title\n"
                              : fmt::format("set title {} noenhanced font ',13' offset 0,-0.7\n", quoted(panel.title));
     s += panel.log_y ? "set logscale y\n" : "unset logscale y\n";
-    s += panel.y_min != panel.y_max ? fmt::format("set yrange [{}:{}]\n", panel.y_min, panel.y_max)
-                                    : std::string("set yrange [*:*]\nset offsets graph 0,0,0.06,0.06\n");
+    const auto [low, high] = y_range(panel);
+    s += fmt::format("set yrange [{}:{}]\n", low, high);
     s += "unset object\nunset arrow\n";
     for (int label = 10; label < 40; ++label) s += fmt::format("unset label {}\n", label);
     int tag = 10;
