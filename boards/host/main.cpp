@@ -10,6 +10,7 @@
 #include <cfenv>
 #endif
 
+#include "boards/host/figures.hpp"
 #include "boards/host/run_scene.hpp"
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
@@ -29,6 +30,7 @@ constexpr const char* examples =
     "  host-sim run jump                         the scene, its log and its picture below ./out/jump\n"
     "  host-sim run stall --set shaft.angle_rad=0.5 --set seed=7\n"
     "  host-sim run jump --set trust=sheet       what not knowing the motor costs\n"
+    "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and pictures\n"
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
@@ -68,6 +70,12 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
   else fmt::print("{}  picture: {}/{}.svg, logs: {}/*.csv\n", summary_text(result), folder, scene.id, folder);
 }
 
+void figures(const std::string& out, bool json) {
+  const PaperFigures paper = paper_figures(motor_folder);
+  const std::vector<std::string> paths = draw_figures(paper, out + "/figures");
+  fmt::print("{}", json ? figures_json(paper) : figures_text(paper) + fmt::format("Written: {}\n", fmt::join(paths, " ")));
+}
+
 void list() {
   fmt::print("Scenes ({}):\n", scene_folder);
   for (const std::string& name : scene_names(scene_folder)) fmt::print("  {:<16}{}\n", name, read_scene(name, scene_folder, {}).title);
@@ -98,10 +106,15 @@ int main(int argc, char** argv) {
 
   CLI::App* list_command = app.add_subcommand("list", "scenes and motors");
 
+  CLI::App* figures_command = app.add_subcommand("figures", "the paper's figures and tables, computed anew");
+  figures_command->add_option("--out", out, "folder for the pictures")->capture_default_str();
+  figures_command->add_flag("--json", json, "the numbers as JSON on standard output");
+
   try {
     app.parse(argc, argv);
     if (*run_command) run(scene, overrides, out, json);
     if (*list_command) list();
+    if (*figures_command) figures(out, json);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const wire::pc::UserError& error) {
