@@ -19,8 +19,8 @@ namespace {
 
 constexpr int width = 960, panel_height = 230, head_height = 80, foot_height = 50;
 constexpr std::size_t most_points = 2000;  // per curve: about two per pixel
-// Okabe and Ito's palette, readable with any colour vision.
-constexpr const char* palette[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#404040"};
+// Okabe and Ito's palette, readable with any colour vision, and a brown.
+constexpr const char* palette[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#404040", "#8c5a2b"};
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -77,6 +77,15 @@ std::pair<double, double> y_range(const Panel& panel) {
   return {low - air, high + air};
 }
 
+/// Width of the key beside the plots, as share of the picture: about 7 pixels a character, a sample and a margin.
+double key_share(const Picture& picture) {
+  std::size_t longest = 0;
+  for (const Panel& panel : picture.panels) {
+    for (const Curve& curve : panel.curves) longest = std::max(longest, curve.label.size());
+  }
+  return std::clamp((7.0 * static_cast<double>(longest) + 55) / width, 0.03, 0.45);
+}
+
 std::string script(const Picture& picture, const std::string& output) {
   const int panels = static_cast<int>(picture.panels.size());
   const int height = head_height + panels * panel_height + foot_height;
@@ -88,8 +97,8 @@ std::string script(const Picture& picture, const std::string& output) {
   s += fmt::format("set label 2 {} at screen 0.012,{} left font ',12' textcolor '#606060' noenhanced\n",
                    quoted(picture.note), 1.0 - 46.0 / height);
   s += "set border 3 lc '#808080'\nset tics nomirror textcolor '#404040'\nset grid lc '#e4e4e4' lt 1\n"
-       "set key outside right top vertical noenhanced samplen 1.6 width 0 maxrows 12\nset lmargin at screen 0.085\nset "
-       "rmargin at screen 0.78\n";
+       "set key outside right top vertical noenhanced samplen 1.6 width 0 maxrows 12\nset lmargin at screen 0.085\n";
+  s += fmt::format("set rmargin at screen {:.3f}\n", 1 - key_share(picture));
   if (picture.log_x) s += "set logscale x\n";
   if (picture.x_range.first != picture.x_range.second) {
     s += fmt::format("set xrange [{}:{}]\n", picture.x_range.first, picture.x_range.second);
