@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The larger stage of the same design (H8-17.5D class): 80 A for seconds. What is known of it is the 80 A; the continuous
-// current is an assumption of ours (the smaller stage's ratio), and so is everything it shares with the smaller one.
+// The larger stage of the same design (H8-17.5D class): 80 A for seconds. What is known of it is the 80 A; the
+// continuous current is an assumption of ours (the smaller stage's ratio), and so is everything it shares with the
+// smaller one.
 #pragma once
 
 #include "boards/dual_48v_20a.hpp"

@@ -13,7 +13,8 @@ hal::AxisSample AxisDoor::sample() noexcept {
     valid = valid && counts > 0 && counts < design_->adc_full_scale;  // at a rail the current may be anything
     return static_cast<float>((counts - design_->current_zero_counts) * design_->current_A_per_count);
   };
-  const wire::Abc current_A = {ampere(raw.current_counts[0]), ampere(raw.current_counts[1]), ampere(raw.current_counts[2])};
+  const wire::Abc current_A = {ampere(raw.current_counts[0]), ampere(raw.current_counts[1]),
+                               ampere(raw.current_counts[2])};
   const int position = raw.encoder_counts % design_->encoder_counts_per_turn;
   return {.current_A = current_A,
           .bus_V = static_cast<float>(bench_->board_raw().bus_voltage_counts * design_->bus_V_per_count),

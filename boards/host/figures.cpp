@@ -50,7 +50,9 @@ std::string table_of(const std::vector<PaperCurve>& curves, const char* format) 
   return out + "\n";
 }
 
-std::string known(double value, const char* unit) { return std::isnan(value) ? "not found" : fmt::format("{:g} {}", value, unit); }
+std::string known(double value, const char* unit) {
+  return std::isnan(value) ? "not found" : fmt::format("{:g} {}", value, unit);
+}
 
 wire::pc::Panel panel_of(const std::vector<PaperCurve>& curves, const std::string& y_label, bool log_y) {
   wire::pc::Panel panel{y_label, {}};
@@ -72,8 +74,12 @@ PaperFigures paper_figures(const std::string& motor_folder) {
   const double uncooled_A = thermal::rated_current_A(large, ambient_degC);
 
   PaperFigures f;
-  const auto overload = [](const wire::Motor& m) { return [&m](double t_s) { return overload_ratio(m, t_s, ambient_degC); }; };
-  const auto housing = [](const wire::Motor& m) { return [&m](double t_s) { return housing_at_limit_degC(m, t_s, ambient_degC); }; };
+  const auto overload = [](const wire::Motor& m) {
+    return [&m](double t_s) { return overload_ratio(m, t_s, ambient_degC); };
+  };
+  const auto housing = [](const wire::Motor& m) {
+    return [&m](double t_s) { return housing_at_limit_degC(m, t_s, ambient_degC); };
+  };
   f.overload = {curve("200 W", overload(large)), curve("EC 16, 40 W (surrogate)", overload(small)),
                 curve("200 W, water cooled (of its air rating)",
                       [&](double t_s) { return thermal::current_to_limit_A(cooled, t_s, ambient_degC) / uncooled_A; })};
@@ -81,11 +87,13 @@ PaperFigures paper_figures(const std::string& motor_folder) {
                curve("200 W, water cooled", housing(cooled))};
 
   const thermal::BoardRating stage;
-  f.amperes = {curve("EC 16, 40 W (surrogate)",
-                     [&](double t_s) { return thermal::direct_A(thermal::current_to_limit_A(small, t_s, ambient_degC)); }),
-               curve("driver, one pole through 6 A and 20 A for 15 s", [&](double t_s) {
-                 return static_cast<double>(stage.continuous_A) / std::sqrt(-std::expm1(-t_s / static_cast<double>(stage.tau_s)));
-               })};
+  f.amperes = {
+      curve("EC 16, 40 W (surrogate)",
+            [&](double t_s) { return thermal::direct_A(thermal::current_to_limit_A(small, t_s, ambient_degC)); }),
+      curve("driver, one pole through 6 A and 20 A for 15 s", [&](double t_s) {
+        return static_cast<double>(stage.continuous_A) /
+               std::sqrt(-std::expm1(-t_s / static_cast<double>(stage.tau_s)));
+      })};
   f.boards = {{"H8-15D", 2, 48, static_cast<double>(stage.continuous_A), 20, 15, static_cast<double>(stage.tau_s)},
               {"H8-17.5D", 2, unknown, unknown, 80, unknown, unknown}};
 
@@ -103,7 +111,8 @@ PaperFigures paper_figures(const std::string& motor_folder) {
 
 std::string figures_text(const PaperFigures& f) {
   std::string out = fmt::format(
-      "From cold at {:g} degC to the winding's limit, constant current, copper coefficient in load and rating.\n\n", ambient_degC);
+      "From cold at {:g} degC to the winding's limit, constant current, copper coefficient in load and rating.\n\n",
+      ambient_degC);
   out += "Fig 1  current over rated current\n" + table_of(f.overload, "{:.2f}");
   out += "Fig 2  housing when the winding is at its limit, degC\n" + table_of(f.housing, "{:.1f}");
   out += "Fig 6  direct current, A\n" + table_of(f.amperes, "{:.1f}");
@@ -113,8 +122,8 @@ std::string figures_text(const PaperFigures& f) {
                        known(b.supply_V, "V"), known(b.continuous_A, "A"), known(b.peak_A, "A"), known(b.peak_s, "s"),
                        known(b.pole_s, "s"));
   }
-  out += fmt::format("Index table\n  {:<34}{:>9}{:>9}{:>9}{:>9}{:>14}{:>8}  {}\n", "motor", "R1 K/W", "R2 K/W", "tau_w s", "tau_m s",
-                     "(6) sqrt(s)", "(7)", "status");
+  out += fmt::format("Index table\n  {:<34}{:>9}{:>9}{:>9}{:>9}{:>14}{:>8}  {}\n", "motor", "R1 K/W", "R2 K/W",
+                     "tau_w s", "tau_m s", "(6) sqrt(s)", "(7)", "status");
   for (const IndexRow& r : f.indices) {
     out += fmt::format("  {:<34}{:>9g}{:>9g}{:>9g}{:>9g}{:>14.2f}{:>8.2f}  {}\n", r.motor, r.R1_K_per_W, r.R2_K_per_W,
                        r.tau_winding_s, r.tau_motor_s, r.short_term, r.forced_cooling, r.status);
@@ -132,11 +141,18 @@ std::string figures_json(const PaperFigures& f) {
   put("fig2_housing_degC", f.housing);
   put("fig6_direct_A", f.amperes);
   for (const BoardRow& b : f.boards) {  // NaN becomes null: not known
-    out["boards"].push_back({{"board", b.board}, {"axes", b.axes}, {"supply_V", b.supply_V}, {"continuous_A", b.continuous_A},
-                             {"peak_A", b.peak_A}, {"peak_s", b.peak_s}, {"pole_s", b.pole_s}});
+    out["boards"].push_back({{"board", b.board},
+                             {"axes", b.axes},
+                             {"supply_V", b.supply_V},
+                             {"continuous_A", b.continuous_A},
+                             {"peak_A", b.peak_A},
+                             {"peak_s", b.peak_s},
+                             {"pole_s", b.pole_s}});
   }
   for (const IndexRow& r : f.indices) {
-    out["indices"].push_back({{"motor", r.motor}, {"status", r.status}, {"short_term_sqrt_s", r.short_term},
+    out["indices"].push_back({{"motor", r.motor},
+                              {"status", r.status},
+                              {"short_term_sqrt_s", r.short_term},
                               {"forced_cooling", r.forced_cooling}});
   }
   return out.dump(2) + "\n";
@@ -145,21 +161,25 @@ std::string figures_json(const PaperFigures& f) {
 std::vector<std::string> draw_figures(const PaperFigures& f, const std::string& folder) {
   const std::string time = "time to the limit, s";
   const auto path = [&](const char* name) { return folder + "/" + name; };
-  wire::pc::write_svg(path("fig1.svg"), {.title = "Fig 1: how many times its rated current a motor stands",
-                                         .x_label = time,
-                                         .panels = {panel_of(f.overload, "current / rated current", true)},
-                                         .log_x = true,
-                                         .note = "Computed from sheet values, corrected equations; EC 16 values are a surrogate."});
-  wire::pc::write_svg(path("fig2.svg"), {.title = "Fig 2: how warm the housing is when the winding burns",
-                                         .x_label = time,
-                                         .panels = {panel_of(f.housing, "housing, °C", false)},
-                                         .log_x = true,
-                                         .note = "Within seconds the housing has noticed nothing; water cooled, it never does."});
-  wire::pc::write_svg(path("fig6.svg"), {.title = "Fig 6: what the motor stands and what the driver stands",
-                                         .x_label = "duration, s",
-                                         .panels = {panel_of(f.amperes, "direct current, A", true)},
-                                         .log_x = true,
-                                         .note = "Driver: its thermal reading; if 20 A is a hard peak, the motor stands more below 0.33 s."});
+  wire::pc::write_svg(path("fig1.svg"),
+                      {.title = "Fig 1: how many times its rated current a motor stands",
+                       .x_label = time,
+                       .panels = {panel_of(f.overload, "current / rated current", true)},
+                       .log_x = true,
+                       .note = "Computed from sheet values, corrected equations; EC 16 values are a surrogate."});
+  wire::pc::write_svg(path("fig2.svg"),
+                      {.title = "Fig 2: how warm the housing is when the winding burns",
+                       .x_label = time,
+                       .panels = {panel_of(f.housing, "housing, °C", false)},
+                       .log_x = true,
+                       .note = "Within seconds the housing has noticed nothing; water cooled, it never does."});
+  wire::pc::write_svg(
+      path("fig6.svg"),
+      {.title = "Fig 6: what the motor stands and what the driver stands",
+       .x_label = "duration, s",
+       .panels = {panel_of(f.amperes, "direct current, A", true)},
+       .log_x = true,
+       .note = "Driver: its thermal reading; if 20 A is a hard peak, the motor stands more below 0.33 s."});
   wire::pc::Curve dots{"", {}, {}, "", false, true};
   wire::pc::Picture index{.title = "Index table: short pushes (6) and forced cooling (7)",
                           .x_label = "(6) short-term index, sqrt(s)",

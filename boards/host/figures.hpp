@@ -31,11 +31,11 @@ struct BoardRow {
 };
 
 struct PaperFigures {
-  std::vector<PaperCurve> overload;   // Fig 1: I / I_N that brings the winding to its limit in t
-  std::vector<PaperCurve> housing;    // Fig 2: housing temperature at that moment, degC
-  std::vector<PaperCurve> amperes;    // Fig 6: direct current of the motor and of the driver, A
-  std::vector<BoardRow> boards;       // Tables I and II
-  std::vector<IndexRow> indices;      // the index table
+  std::vector<PaperCurve> overload;  // Fig 1: I / I_N that brings the winding to its limit in t
+  std::vector<PaperCurve> housing;   // Fig 2: housing temperature at that moment, degC
+  std::vector<PaperCurve> amperes;   // Fig 6: direct current of the motor and of the driver, A
+  std::vector<BoardRow> boards;      // Tables I and II
+  std::vector<IndexRow> indices;     // the index table
 };
 
 extern const std::vector<double> paper_times_s;

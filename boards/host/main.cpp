@@ -30,7 +30,8 @@ constexpr const char* examples =
     "  host-sim run jump                         the scene, its log and its picture below ./out/jump\n"
     "  host-sim run stall --set shaft.angle_rad=0.5 --set seed=7\n"
     "  host-sim run jump --set trust=sheet       what not knowing the motor costs\n"
-    "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and pictures\n"
+    "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and "
+    "pictures\n"
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
@@ -66,19 +67,23 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
     wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), axis), csv(result, trace));
   }
   draw(result, fmt::format("{}/{}.svg", folder, scene.id));
-  if (json) fmt::print("{}", summary_json(result));
-  else fmt::print("{}  picture: {}/{}.svg, logs: {}/*.csv\n", summary_text(result), folder, scene.id, folder);
+  if (json)
+    fmt::print("{}", summary_json(result));
+  else
+    fmt::print("{}  picture: {}/{}.svg, logs: {}/*.csv\n", summary_text(result), folder, scene.id, folder);
 }
 
 void figures(const std::string& out, bool json) {
   const PaperFigures paper = paper_figures(motor_folder);
   const std::vector<std::string> paths = draw_figures(paper, out + "/figures");
-  fmt::print("{}", json ? figures_json(paper) : figures_text(paper) + fmt::format("Written: {}\n", fmt::join(paths, " ")));
+  fmt::print("{}",
+             json ? figures_json(paper) : figures_text(paper) + fmt::format("Written: {}\n", fmt::join(paths, " ")));
 }
 
 void list() {
   fmt::print("Scenes ({}):\n", scene_folder);
-  for (const std::string& name : scene_names(scene_folder)) fmt::print("  {:<16}{}\n", name, read_scene(name, scene_folder, {}).title);
+  for (const std::string& name : scene_names(scene_folder))
+    fmt::print("  {:<16}{}\n", name, read_scene(name, scene_folder, {}).title);
   fmt::print("Motors ({}):\n", motor_folder);
   for (const std::string& name : wire::pc::motor_names(motor_folder)) {
     const wire::pc::MotorFile file = wire::pc::read_motor(name, motor_folder);
@@ -100,7 +105,8 @@ int main(int argc, char** argv) {
 
   CLI::App* run_command = app.add_subcommand("run", "play a scene");
   run_command->add_option("scene", scene, "a name (see list) or a .toml file")->required();
-  run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")->take_all();
+  run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")
+      ->take_all();
   run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str();
   run_command->add_flag("--json", json, "the summary as JSON on standard output");
 

@@ -8,8 +8,8 @@
 #include <ctime>
 #include <numbers>
 
-#include "boards/host/board.hpp"
 #include "boards/dual_48v_80a.hpp"
+#include "boards/host/board.hpp"
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
@@ -21,23 +21,28 @@ namespace boards::host {
 namespace {
 
 constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;  // direct current that heats like a phase amplitude of 1 A
-constexpr double no_limit_degC = 1000;    // for limiters that must do without the governor
+constexpr double no_limit_degC = 1000;                     // for limiters that must do without the governor
 constexpr double restart_K = 10;                           // a cut limiter comes back this far below its limit
 constexpr int setpoint_periods = 20;                       // the robot's computer speaks every millisecond
-constexpr long progress_periods = 20000;                // a simulated second
-constexpr double warm_up_s = 1;                            // the board has been on for a second: offsets learnt, housing heard
+constexpr long progress_periods = 20000;                   // a simulated second
+constexpr double warm_up_s = 1;  // the board has been on for a second: offsets learnt, housing heard
 
 /// What stands between the demand and the firmware.
 class Wish {
  public:
-  Wish(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file) : scene_(scene), limiter_(limiter), motor_(file.motor) {}
+  Wish(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file)
+      : scene_(scene), limiter_(limiter), motor_(file.motor) {}
 
   double amperes(double demand_A, double estimated_core_degC, const hal::Temperature& housing) {
     switch (limiter_) {
-      case Limiter::governor: return demand_A;
-      case Limiter::rated: return std::clamp(demand_A, -motor_.rated_current_A / root_3_over_2, motor_.rated_current_A / root_3_over_2);
-      case Limiter::housing: return cut(housing.value_degC, scene_.housing_limit_degC) ? 0 : demand_A;
-      case Limiter::hard_cut: return cut(estimated_core_degC, motor_.winding_max_degC) ? 0 : demand_A;
+      case Limiter::governor:
+        return demand_A;
+      case Limiter::rated:
+        return std::clamp(demand_A, -motor_.rated_current_A / root_3_over_2, motor_.rated_current_A / root_3_over_2);
+      case Limiter::housing:
+        return cut(housing.value_degC, scene_.housing_limit_degC) ? 0 : demand_A;
+      case Limiter::hard_cut:
+        return cut(estimated_core_degC, motor_.winding_max_degC) ? 0 : demand_A;
     }
     return 0;
   }
@@ -174,8 +179,9 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
   firmware::AxisSetup axis;
   axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
   axis.heat = thermal::three_phase_set(known);
-  axis.estimator.trust = scene.trust == "sheet" ? thermal::sheet_trust
-                         : scene.trust == "identified" ? thermal::identified_trust : thermal::exact_trust;
+  axis.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
+                         : scene.trust == "identified" ? thermal::identified_trust
+                                                       : thermal::exact_trust;
   return {rating, {axis, axis}};
 }
 
@@ -203,7 +209,8 @@ void Board::arm(int axis) {
   const wire::Status status = driver_.axis(axis).arm();
   if (status == wire::Status::done) return;
   const wire::CodeText text = wire::text_of(status);
-  throw wire::pc::UserError(wire::pc::Exit::usage, fmt::format("Axis {} would not arm: {}; {}.", axis, text.happened, text.advice));
+  throw wire::pc::UserError(wire::pc::Exit::usage,
+                            fmt::format("Axis {} would not arm: {}; {}.", axis, text.happened, text.advice));
 }
 
 void Board::speak(const Trace& trace, Wish& wish, double time_s) {
@@ -279,7 +286,8 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
         trace.rows.push_back(line);
       }
     }
-    if (progress && periods_ % progress_periods == 0) progress(static_cast<double>(periods_) / static_cast<double>(total));
+    if (progress && periods_ % progress_periods == 0)
+      progress(static_cast<double>(periods_) / static_cast<double>(total));
   }
   return traces;
 }
@@ -296,7 +304,8 @@ Result run_scene(const Scene& scene, const RunOptions& options) {
                 .traces = {}};
 
   if (scene.shaft.kind != Shaft::Kind::locked) {
-    const wire::Motor known = host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
+    const wire::Motor known =
+        host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
     result.optimal_impulse_As = optimal_impulse_As(scene, known, static_cast<double>(rating_of(scene.board).peak_A));
   }
 
@@ -304,7 +313,9 @@ Result run_scene(const Scene& scene, const RunOptions& options) {
   for (std::size_t i = 0; i < scene.limiters.size(); ++i) {
     std::function<void(double)> share;
     if (options.progress) {
-      share = [&, i](double done) { options.progress((static_cast<double>(i) + done) / static_cast<double>(scene.limiters.size())); };
+      share = [&, i](double done) {
+        options.progress((static_cast<double>(i) + done) / static_cast<double>(scene.limiters.size()));
+      };
     }
     Board board(scene, scene.limiters[i], file, options);
     for (Trace& trace : board.play(share)) result.traces.push_back(std::move(trace));

@@ -13,7 +13,7 @@ namespace boards::host {
 
 struct RunOptions {
   std::string motor_folder;
-  host_sim::HiddenEffects hidden = {};             // that the firmware does not know
+  host_sim::HiddenEffects hidden = {};              // that the firmware does not know
   std::function<void(double share)> progress = {};  // 0..1, a few times a second of simulated time
 };
 

@@ -94,7 +94,7 @@ struct Reader {
     return {{{"kind", kind}},
             {{"angle_rad", {&s.angle_rad, -10, 10}},
              {"load_inertia_kg_m2", {&s.load_inertia_kg_m2, 0, 1}},
-              {"speed_rad_per_s", {&s.speed_rad_per_s, -5000, 5000}},
+             {"speed_rad_per_s", {&s.speed_rad_per_s, -5000, 5000}},
              {"speed_amplitude_rad_per_s", {&s.speed_amplitude_rad_per_s, 0, 5000}},
              {"frequency_Hz", {&s.frequency_Hz, 0, 100}}},
             {"landings_s"}};

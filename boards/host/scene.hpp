@@ -30,10 +30,10 @@ struct Demand {
 /// What holds the shaft.
 struct Shaft {
   enum class Kind { locked, free, imposed } kind = Kind::locked;
-  double angle_rad = 0;           // electrical angle of a locked rotor
-  double load_inertia_kg_m2 = 0;  // of a free shaft, added to the rotor's
-  std::vector<double> landings_s;     // of a free shaft: times at which the load is brought to rest
-  double speed_rad_per_s = 0;     // of an imposed motion: mean
+  double angle_rad = 0;            // electrical angle of a locked rotor
+  double load_inertia_kg_m2 = 0;   // of a free shaft, added to the rotor's
+  std::vector<double> landings_s;  // of a free shaft: times at which the load is brought to rest
+  double speed_rad_per_s = 0;      // of an imposed motion: mean
   double speed_amplitude_rad_per_s = 0;
   double frequency_Hz = 0;
 };
@@ -42,7 +42,7 @@ struct Scene {
   std::string id, title, note;
   std::string motor = "ec-16-40w";
   std::string board = "h8-15d";  // rating of the power stage: h8-15d or h8-17.5d
-  std::string trust = "exact";       // in the motor's thermal values: exact (the simulated motor's own), identified, sheet
+  std::string trust = "exact";   // in the motor's thermal values: exact (the simulated motor's own), identified, sheet
   double seconds = 1;
   double log_Hz = 1000;
   unsigned seed = 1;

@@ -29,7 +29,8 @@ std::string complaint(const std::string& which, const std::vector<std::string>& 
 }
 
 std::string complaint_about(const std::string& text) {
-  const std::string path = ::testing::TempDir() + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".toml";
+  const std::string path =
+      ::testing::TempDir() + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".toml";
   std::ofstream(path) << text;
   return complaint(path);
 }

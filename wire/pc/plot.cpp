@@ -20,7 +20,8 @@ namespace {
 constexpr int width = 960, panel_height = 230, head_height = 80, foot_height = 50;
 constexpr std::size_t most_points = 2000;  // per curve: about two per pixel
 // Okabe and Ito's palette, readable with any colour vision, and a brown.
-constexpr const char* palette[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#404040", "#8c5a2b"};
+constexpr const char* palette[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                   "#e69f00", "#56b4e9", "#404040", "#8c5a2b"};
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";

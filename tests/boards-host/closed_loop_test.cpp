@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// The firmware on simulated boards, judged by what the simulated windings really did.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "boards/host/run_scene.hpp"
+#include "boards/host/scene.hpp"
+
+namespace {
+
+using boards::host::Limiter;
+using boards::host::Result;
+using boards::host::Row;
+using boards::host::Scene;
+using boards::host::Trace;
+
+constexpr double overshoot_K = 3;  // of the true winding, no fault, true parameters (safety.md)
+constexpr double share_of_optimum = 0.95;
+
+Result play(const std::string& name, const std::vector<std::string>& overrides = {},
+            std::vector<Limiter> limiters = {Limiter::governor}) {
+  Scene scene = boards::host::read_scene(name, HOTCORE_SOURCE_DIR "/host-sim/scenes", overrides);
+  scene.limiters = std::move(limiters);
+  return boards::host::run_scene(scene, {.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors"});
+}
+
+void expect_cool_and_unbroken(const Result& result, const std::string& what) {
+  for (const Trace& trace : result.traces) {
+    EXPECT_LE(trace.hottest_true_degC, result.winding_max_degC + overshoot_K) << what << ", axis " << trace.axis;
+    EXPECT_GT(trace.impulse_As, 0) << what << ": nothing was delivered, so nothing was shown";
+    for (const Row& row : trace.rows) ASSERT_EQ(row.fault, wire::Fault::none) << what << " at " << row.time_s << " s";
+  }
+}
+
+TEST(ClosedLoop, NoFaultFreeSceneBurnsAWinding) {
+  for (const char* name : {"jump", "get-up", "stall", "hold", "walk-loaded", "water-cooled"})
+    expect_cool_and_unbroken(play(name), name);
+}
+
+TEST(ClosedLoop, ABlockedRotorIsSafeAtEveryAngle) {
+  double hottest_degC = 0;
+  for (int k = 0; k < 36; ++k) {
+    const std::string angle = "shaft.angle_rad=" + std::to_string(k * 2 * M_PI / 36);
+    const Result result = play("stall", {angle, "seconds=6", "seed=" + std::to_string(k)});
+    expect_cool_and_unbroken(result, angle);
+    hottest_degC = std::max(hottest_degC, result.traces[0].hottest_true_degC);
+  }
+  RecordProperty("hottest_degC", std::to_string(hottest_degC));
+  EXPECT_GT(hottest_degC, 150) << "the limit was never reached, so nothing was shown";
+}
+
+TEST(ClosedLoop, TheLargeMotorIsSafeWhenBlockedOnTheLargeBoard) {
+  for (const char* motor : {"motor=ec-powermax-30-24v", "motor=ec-powermax-30-48v"}) {
+    for (int k = 0; k < 6; ++k) {
+      Scene scene = boards::host::read_scene(
+          "stall", HOTCORE_SOURCE_DIR "/host-sim/scenes",
+          {motor, "board=h8-17.5d", "seconds=8", "shaft.angle_rad=" + std::to_string(k * 0.17)});
+      scene.demands[0].current_A = 80;
+      const Result result = boards::host::run_scene(scene, {.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors"});
+      expect_cool_and_unbroken(result, motor);
+    }
+  }
+}
+
+TEST(ClosedLoop, JumpGivesThreeHundredWattsAndNearlyAllOfTheOptimum) {
+  const Result result = play("jump");
+  EXPECT_GT(result.traces[0].peak_shaft_W, 300);
+  EXPECT_LT(result.traces[0].hottest_true_degC, result.winding_max_degC);
+  EXPECT_GE(result.traces[0].impulse_As, share_of_optimum * result.optimal_impulse_As);
+}
+
+TEST(ClosedLoop, JumpBurnsTheWindingUnderAHousingLimitAndIsImpossibleUnderARatedLimit) {
+  const Result result = play("jump", {}, {Limiter::housing, Limiter::rated});
+  EXPECT_GT(result.traces[0].hottest_true_degC, result.winding_max_degC + 30);
+  EXPECT_LT(result.traces[1].peak_shaft_W, 40);
+}
+
+TEST(ClosedLoop, GetUpComesDownSmoothlyWhereTheHardCutDropsTheRobot) {
+  const Result result = play("get-up", {"log_Hz=100"}, {Limiter::governor, Limiter::hard_cut});
+  const Trace& ours = result.traces[0];
+  EXPECT_GE(ours.impulse_As, share_of_optimum * result.optimal_impulse_As);
+  EXPECT_LT(result.traces[1].impulse_As, 0.8 * result.optimal_impulse_As);
+  double least_A = 1e9, steepest_A = 0;
+  for (std::size_t i = 1; i < ours.rows.size(); ++i) {
+    if (ours.rows[i].demand_A == 0 || ours.rows[i - 1].demand_A == 0) continue;
+    least_A = std::min(least_A, ours.rows[i].allowance_A);
+    steepest_A = std::max(steepest_A, ours.rows[i - 1].allowance_A - ours.rows[i].allowance_A);
+  }
+  EXPECT_LT(steepest_A, 0.02 * 20) << "the allowance may fall by 2 % of the peak in 10 ms";
+  EXPECT_GT(least_A, 8) << "what the winding can hold at 300 rad/s is about 9 A";
+  bool fell = false;
+  for (const Row& row : result.traces[1].rows)
+    fell = fell || (row.demand_A > 0 && std::abs(row.iq_A) < 1 && row.time_s > 0.5);
+  EXPECT_TRUE(fell) << "the paper's cut takes all current away";
+}
+
+TEST(ClosedLoop, NotKnowingTheMotorCostsImpulseNotTheMotor) {
+  const Result exact = play("get-up"), sheet = play("get-up", {"trust=sheet"});
+  expect_cool_and_unbroken(sheet, "trust=sheet");
+  EXPECT_LT(sheet.traces[0].hottest_true_degC, exact.traces[0].hottest_true_degC - 10);
+  EXPECT_LT(sheet.traces[0].impulse_As, exact.traces[0].impulse_As);
+}
+
+TEST(ClosedLoop, TheSameSeedGivesTheSameLogAndAnotherSeedAnother) {
+  const auto log = [](const std::string& seed) {
+    const Result result = play("jump", {seed});
+    return boards::host::csv(result, result.traces[0]);
+  };
+  const std::string once = log("seed=11");
+  EXPECT_EQ(once, log("seed=11"));
+  EXPECT_NE(once.substr(once.find('\n')), log("seed=12").substr(once.find('\n')));
+}
+
+}  // namespace
