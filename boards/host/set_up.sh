@@ -26,7 +26,7 @@ install_missing() {
 set_up() {
   local preset=$1
   install_missing "${packages_host[@]}"
-  [ "$preset" = qemu-m4f ] && install_missing "${packages_qemu_m4f[@]}"
+  [[ "$preset" == qemu-m4f || "$preset" == h8-15d ]] && install_missing "${packages_qemu_m4f[@]}"
   say "Building: $preset"
   (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" >&2)
 }

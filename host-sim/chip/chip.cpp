@@ -68,10 +68,12 @@ Chip::Chip()
               for (int i = 1; i <= 3; ++i) adc(i).trigger(14);
             },  // JEXTSEL 1110: TIM8_CC4
             [] {}, 43, 44, 46}),
-      tim3(*this, "TIM3", 0x40000400, 1,
-           [this] { return port('B').is_alternate(4, 2) && port('B').is_alternate(5, 2); }),
-      tim4(*this, "TIM4", 0x40000800, 2,
-           [this] { return port('B').is_alternate(6, 2) && port('B').is_alternate(7, 2); }),
+      tim3(
+          *this, "TIM3", 0x40000400, 1, [this] { return port('B').is_alternate(4, 2) && port('B').is_alternate(5, 2); },
+          [this] { return nvic.running() == 16 + 9; }),
+      tim4(
+          *this, "TIM4", 0x40000800, 2, [this] { return port('B').is_alternate(6, 2) && port('B').is_alternate(7, 2); },
+          [this] { return nvic.running() == 16 + 23; }),
       adc_common(*this),
       adc1(*this, 1,
            {[this] { return rcc.tree().pclk2_Hz; },

@@ -14,7 +14,6 @@ void check(uc_err error) {
 }
 
 constexpr std::uint16_t wfi_opcode = 0xBF30, bkpt_semihosting = 0xBEAB;
-constexpr std::size_t no_lane = 0;
 
 std::uint64_t read_mmio(uc_engine*, std::uint64_t offset, unsigned size, void* bus, std::uint32_t base) {
   return static_cast<Bus*>(bus)->bus_read(base + static_cast<std::uint32_t>(offset), size);
@@ -75,11 +74,14 @@ std::uint32_t Core::word(std::uint32_t address) const {
 }
 void Core::poke(std::uint32_t address, std::uint32_t value) { uc_mem_write(uc_, address, &value, 4); }
 
-void Core::refresh_flash(std::uint32_t address, std::uint32_t size) {
-  const std::uint32_t first = (address - flash_base) / 2;
-  for (std::uint32_t i = first; i < first + size / 2 && i < cache_.size(); ++i) cache_[i] = {};
-  uc_ctl_remove_cache(uc_, address, address + size);
-  uc_ctl_remove_cache(uc_, address - flash_base, address - flash_base + size);
+void Core::forget_code() {
+  for (const Range& r : stale_) {
+    const std::uint32_t first = (r.address - flash_base) / 2;
+    for (std::uint32_t i = first; i < first + r.size / 2 && i < cache_.size(); ++i) cache_[i] = {};
+    uc_ctl_remove_cache(uc_, r.address, r.address + r.size);
+    uc_ctl_remove_cache(uc_, r.address - flash_base, r.address - flash_base + r.size);
+  }
+  stale_.clear();
 }
 
 void Core::reset() {
@@ -213,6 +215,7 @@ bool Core::masks(bool& primask, bool& faultmask, std::uint32_t& basepri) const {
 
 void Core::run(Time until) {
   if (locked_up_ || exited_) return;
+  if (!stale_.empty()) forget_code();
   dispatch();
   if (sleeping_) {
     if (!nvic_.wakes()) {
@@ -252,6 +255,15 @@ void Core::run(Time until) {
     if (op[0] == wfi_opcode || op[1] == wfi_opcode) {
       if (op[1] == wfi_opcode && op[0] != wfi_opcode) set(UC_ARM_REG_PC, (pc + 2) | 1);
       sleeping_ = true;
+      if (nvic_.depth() == 0) {
+        const std::uint64_t own = instructions_ - awake_at_ - in_handlers_;
+        LaneCount& main_lane = lanes_[0];
+        ++main_lane.calls;
+        main_lane.total += own;
+        if (own > main_lane.worst) main_lane.worst = own;
+        awake_at_ = instructions_;
+        in_handlers_ = 0;
+      }
     }
   }
   dispatch();
@@ -339,7 +351,10 @@ void Core::exception_return(std::uint32_t exc_return) {
     ++lane.calls;
     lane.total += own;
     if (own > lane.worst) lane.worst = own;
-    if (!frames_.empty()) frames_.back().nested += all;
+    if (!frames_.empty())
+      frames_.back().nested += all;
+    else
+      in_handlers_ += all;
   }
   bool primask, faultmask;
   std::uint32_t basepri;
@@ -380,6 +395,8 @@ void Core::clear_counts() {
   lanes_.fill({});
   events_.clear();
   slept_ = 0;
+  awake_at_ = instructions_;
+  in_handlers_ = 0;
 }
 
 }  // namespace host_sim::chip

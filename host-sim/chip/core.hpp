@@ -76,10 +76,12 @@ class Core {
   std::uint8_t* system_memory() { return system_.data(); }
   std::uint32_t word(std::uint32_t address) const;
   void poke(std::uint32_t address, std::uint32_t value);
-  void refresh_flash(std::uint32_t address, std::uint32_t size);
+  /// Translated code of this range is forgotten before the core goes on.
+  void refresh_flash(std::uint32_t address, std::uint32_t size) { stale_.push_back({address, size}); }
 
   void trace(bool on) { tracing_ = on; }
   const std::vector<ExceptionEvent>& events() const { return events_; }
+  /// 0: the main program, counted from waking to sleeping, handlers excluded.
   const LaneCount& lane(int exception) const { return lanes_[static_cast<std::size_t>(exception)]; }
   void clear_counts();
   /// Fault injection: from its next entry on, this exception's handler (0: the main program) never ends.
@@ -129,6 +131,12 @@ class Core {
   std::vector<ExceptionEvent> events_;
   std::array<LaneCount, exception_count> lanes_{};
   std::vector<Frame> frames_;
+  struct Range {
+    std::uint32_t address, size;
+  };
+  std::vector<Range> stale_;
+  void forget_code();
+  std::uint64_t awake_at_ = 0, in_handlers_ = 0;
 };
 
 }  // namespace host_sim::chip

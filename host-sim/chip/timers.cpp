@@ -129,6 +129,9 @@ void AdvancedTimer::advance(Time now) {
       last_overflow_ = event;
       down_ = centre_aligned();
       overflow_ += step * (centre_aligned() ? 2 * top : top + 1);
+      if (compare_fresh_ && !main_output() && !(peek(sr) >> 7 & 1))
+        trouble("compare values are written, but MOE is off: no output", bdtr);
+      compare_fresh_ = false;
       if (links_.overflow) links_.overflow(event);
       if (!centre_aligned() || peek(rcr) == 0 || !update_on_underflow_) update();
     } else {
@@ -313,6 +316,7 @@ void AdvancedTimer::on_write(std::uint32_t offset, std::uint32_t value) {
         const auto i = (offset - ccr1) / 4;
         const std::uint32_t m =
             i < 2 ? field(peek(ccmr1), 8 * static_cast<int>(i), 8) : field(peek(ccmr2), 8 * static_cast<int>(i - 2), 8);
+        compare_fresh_ = compare_fresh_ || (i < 3 && running_ && !main_output());
         if (i < 3 && value > peek(arr)) trouble("compare value above the reload value", offset);
         if (!(m >> 3 & 1)) {
           active_[i] = value;
@@ -325,8 +329,10 @@ void AdvancedTimer::on_write(std::uint32_t offset, std::uint32_t value) {
 }
 
 EncoderTimer::EncoderTimer(Host& host, const char* name, std::uint32_t base, int enable_bit,
-                           std::function<bool()> pins_connected)
-    : Device(host, name, base, encoder_map, 0x40, enable_bit), pins_connected_(std::move(pins_connected)) {}
+                           std::function<bool()> pins_connected, std::function<bool()> at_index)
+    : Device(host, name, base, encoder_map, 0x40, enable_bit),
+      pins_connected_(std::move(pins_connected)),
+      at_index_(std::move(at_index)) {}
 
 void EncoderTimer::reset() {
   Device::reset();
@@ -341,7 +347,7 @@ std::uint32_t EncoderTimer::count() const {
   const bool inputs = field(peek(ccmr1), 0, 2) == 1 && field(peek(ccmr1), 8, 2) == 1;
   if (!inputs || !pins_connected_()) return stopped_at_;
   const std::int64_t size = static_cast<std::int64_t>(peek(arr)) + 1;
-  std::int64_t moved = edges_ - base_;
+  std::int64_t moved = (at_index_() ? index_edges_ : edges_) - base_;
   if (one) moved /= 2;
   if (((peek(ccer) >> 1) ^ (peek(ccer) >> 5)) & 1) moved = -moved;
   return static_cast<std::uint32_t>(((static_cast<std::int64_t>(stopped_at_) + moved) % size + size) % size);

@@ -93,8 +93,11 @@ class AdvancedTimer : public Device {
 class EncoderTimer : public Device {
  public:
   enum : std::uint32_t { cr1 = 0x00, smcr = 0x08, ccmr1 = 0x18, ccer = 0x20, cnt = 0x24, psc = 0x28, arr = 0x2C };
-  EncoderTimer(Host& host, const char* name, std::uint32_t base, int enable_bit, std::function<bool()> pins_connected);
+  EncoderTimer(Host& host, const char* name, std::uint32_t base, int enable_bit, std::function<bool()> pins_connected,
+               std::function<bool()> at_index);
   void reset() override;
+  /// The plant moves in steps; an index handler would have read the counter in between, at the pulse: this count.
+  void set_index_edges(std::int64_t count) { index_edges_ = count; }
   void set_edges(std::int64_t count) { edges_ = count; }  // quadrature edges since power-on, forwards positive
 
  protected:
@@ -103,8 +106,8 @@ class EncoderTimer : public Device {
 
  private:
   std::uint32_t count() const;
-  std::function<bool()> pins_connected_;
-  std::int64_t edges_ = 0, base_ = 0;
+  std::function<bool()> pins_connected_, at_index_;
+  std::int64_t edges_ = 0, index_edges_ = 0, base_ = 0;
   std::uint32_t stopped_at_ = 0;
 };
 

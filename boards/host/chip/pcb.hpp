@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// The printed circuit board of the H8-15D in numbers: joins the pins of the chip model to the plant of host-sim, by the
+// pin table of boards/h8-15d/README.md and not by the driver's board.hpp, so that a swapped pin shows. The plant takes
+// steps of TIM1's period for both axes; axis 1 acts half a period later on the pins, which is checked there and not
+// felt by the motor. What the driver does to the power stage that no power stage stands is reported as the firmware's
+// mistake.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "boards/h8-15d/door.hpp"
+#include "boards/h8-15d/store.hpp"
+#include "host-sim/chip/chip.hpp"
+#include "host-sim/plant/bench.hpp"
+
+namespace boards {
+
+/// What the amplifiers and dividers of README.md make of amperes, volts and kelvin.
+host_sim::SensorDesign h8_15d_sensors();
+
+class Pcb final : public host_sim::chip::Board {
+ public:
+  Pcb(const host_sim::BenchDesign& design, std::uint64_t seed);
+
+  /// As a programmer would: image, then a parameter record into the first parameter sector.
+  void flash_image(const std::string& elf) { chip.load(elf); }
+  void flash_parameters(const firmware::AxisSetup (&axes)[2], std::uint32_t serial = 1);
+  void power_on(std::uint32_t seed = 1, bool keep_backup = false);
+  void run_for(double seconds);
+
+  /// The debugger's door.
+  h8_15d::Door door() const;
+  void set_current(int axis, float id_A, float iq_A);
+  void wish(int axis, h8_15d::DoorWish what);
+  /// Arms both axes as a person would: waits until the offsets are known. False: refused.
+  bool arm(double patience_s = 0.5);
+
+  bool gates_open(int axis) const { return !last_[static_cast<std::size_t>(axis)].on; }
+  hal::Duty duty(int axis) const { return gates(axis, nullptr); }
+  void set_fault_pin(int axis, bool fault);
+  std::uint64_t periods() const { return periods_; }
+
+  // chip::Board
+  void period_ended(int bridge, host_sim::chip::Time when) override;
+  std::uint32_t analog(int adc, int channel, host_sim::chip::Time closed) override;
+
+  host_sim::chip::Chip chip;
+  host_sim::Bench bench;
+  double weakest_dead_time_s = 450e-9;  // turn-off and driver skew of the assumed MOSFETs with margin
+
+ private:
+  hal::Duty gates(int axis, std::string* complaint) const;
+  void advance();
+  void move_pins();
+  std::uint32_t door_address() const;
+
+  double pwm_period_s_, dead_time_s_;
+  std::array<hal::Duty, 2> last_{};  // of the period just over
+  std::array<std::int64_t, 2> edges_{};
+  std::array<std::uint16_t, 2> counter_{};
+  std::array<std::uint32_t, 2> pulses_{};
+  host_sim::chip::Time advanced_ = 0;
+  std::uint64_t periods_ = 0;
+};
+
+}  // namespace boards

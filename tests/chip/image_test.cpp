@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+// The very image that would be flashed, executed: boots, arms, drives both motors of host-sim, and opens its gates
+// whenever it must. Every test also asks that the model found no mistake of the firmware.
+#include "tests/chip/image.hpp"
+
+#include <array>
+#include <cstdio>
+
+namespace image_tests {
+namespace {
+
+using boards::Pcb;
+using namespace host_sim::chip;
+
+#define NO_TROUBLE(pcb) EXPECT_EQ((pcb).chip.troubles().count(), 0u) << (pcb).chip.report_text()
+
+std::string output_of(const std::string& command) {
+  std::string text;
+  if (FILE* pipe = popen(command.c_str(), "r")) {
+    std::array<char, 256> part{};
+    while (fgets(part.data(), static_cast<int>(part.size()), pipe)) text += part.data();
+    pclose(pipe);
+  }
+  return text;
+}
+
+TEST(Nvic, OrderOfNestedAndChainedHandlersIsThatOfQemu) {
+  NEEDS_IMAGE(order_image);
+  if (std::system("command -v qemu-system-arm >/dev/null") != 0) GTEST_SKIP() << "skipped: no qemu-system-arm";
+  const std::string qemu = output_of(
+      "timeout 20 qemu-system-arm -M mps2-an386 -nographic -monitor none -serial none "
+      "-semihosting -kernel " +
+      order_image + " 2>&1");
+  Chip chip;
+  chip.load(order_image);
+  chip.power_on();
+  chip.core().trace(true);
+  chip.run_for(0.01);
+  ASSERT_TRUE(chip.core().exited());
+  EXPECT_EQ(chip.core().semihost_text(), qemu);
+  EXPECT_GT(qemu.size(), 150u);
+  int chained = 0, depth = 0;
+  for (const ExceptionEvent& e : chip.core().events()) {
+    chained += e.kind == ExceptionEvent::tail_chained;
+    depth = std::max(depth, e.depth);
+  }
+  EXPECT_GE(chained, 5);
+  EXPECT_GE(depth, 2);
+}
+
+TEST(Image, BootsFromColdWithoutAMistakeAndKnowsItself) {
+  NEEDS_IMAGE(image);
+  for (std::uint64_t seed : {1u, 2u, 3u}) {  // RAM holds anything
+    Options o;
+    o.seed = seed;
+    auto pcb = board(o);
+    pcb->run_for(0.05);
+    NO_TROUBLE(*pcb);
+    const auto door = pcb->door();
+    EXPECT_EQ(door.magic, h8_15d::Door::open);
+    EXPECT_NEAR(door.vdda_V, 3.3, 0.01);
+    EXPECT_EQ(door.unique_id[0], pcb->chip.core().word(0x1FFF7A10));
+    EXPECT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+  }
+}
+
+TEST(Image, LearnsItsOffsetsArmsAndHoldsCurrentOnBothAxes) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  ASSERT_TRUE(pcb->arm()) << pcb->door().answer[0] << " " << pcb->chip.report_text();
+  EXPECT_TRUE(pcb->gates_open(0)) << "armed, but nobody asked for current yet";
+  hold(*pcb, 5.0f, -3.0f, 0.05);
+  EXPECT_NEAR(mean_iq_A(*pcb, 0, 5.0f, -3.0f), 5.0, 0.1);  // offsets of +-0.2 A are gone; gain is exact by design
+  EXPECT_NEAR(mean_iq_A(*pcb, 1, 5.0f, -3.0f), -3.0, 0.1);
+  EXPECT_EQ(pcb->door().lost_samples[0] + pcb->door().lost_samples[1], 1u);  // the first, before there was one
+  pcb->run_for(0.4);                                                         // no setpoint: fades and opens
+  EXPECT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, TurnsBothRotorsAndFollowsTheIndex) {
+  NEEDS_IMAGE(image);
+  Options o;
+  o.locked = false;
+  auto pcb = board(o);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 2.0f, -2.0f, 0.1);
+  EXPECT_GT(pcb->bench.truth(0).speed_rad_per_s, 200);
+  EXPECT_LT(pcb->bench.truth(1).speed_rad_per_s, -200);
+  EXPECT_EQ(pcb->door().axis[0].mode, firmware::Mode::running);
+  EXPECT_EQ(pcb->door().axis[1].mode, firmware::Mode::running);
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, RefusesToArmWithoutParameters) {
+  NEEDS_IMAGE(image);
+  Options o;
+  o.parameters = false;
+  auto pcb = board(o);
+  EXPECT_FALSE(pcb->arm(0.3));
+  EXPECT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, AGateDriverFaultOpensTheBridgeWithoutASingleInstruction) {
+  NEEDS_IMAGE(image);
+  for (int axis : {0, 1}) {
+    auto pcb = board();
+    ASSERT_TRUE(pcb->arm());
+    hold(*pcb, 4.0f, 4.0f, 0.02);
+    ASSERT_TRUE(pcb->duty(axis).on);
+    const auto before = pcb->chip.core().instructions();
+    pcb->set_fault_pin(axis, true);
+    EXPECT_FALSE(pcb->duty(axis).on);
+    EXPECT_EQ(pcb->chip.core().instructions(), before);
+    EXPECT_TRUE(pcb->duty(1 - axis).on) << "the other axis is another bridge";
+    pcb->set_fault_pin(axis, false);
+    hold(*pcb, 4.0f, 4.0f, 0.05);
+    EXPECT_FALSE(pcb->duty(axis).on) << "it must not come back by itself";
+    EXPECT_EQ(pcb->door().axis[axis].mode, firmware::Mode::tripped);
+    EXPECT_TRUE(pcb->duty(1 - axis).on);
+    NO_TROUBLE(*pcb);
+  }
+}
+
+TEST(Image, ALostCrystalOpensBothBridgesAndTheImageStaysDisarmed) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  const auto before = pcb->chip.core().instructions();
+  pcb->chip.stop_hse();
+  EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
+  EXPECT_EQ(pcb->chip.core().instructions(), before);
+  pcb->run_for(0.2);
+  EXPECT_EQ(pcb->chip.last_reset(), ResetCause::software);
+  EXPECT_FALSE(pcb->arm(0.1));
+  EXPECT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+}
+
+TEST(Image, AHangOfTheFastLaneEndsInAResetWithOpenGatesWithin2ms) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  pcb->chip.core().hang(16 + 18);
+  const double start_s = to_s(pcb->chip.now());
+  while (pcb->chip.resets() == 0 && to_s(pcb->chip.now()) < start_s + 0.1) pcb->run_for(50e-6);
+  EXPECT_EQ(pcb->chip.last_reset(), ResetCause::wwdg);
+  EXPECT_LE(to_s(pcb->chip.now()) - start_s, 2e-3);
+  EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
+  EXPECT_EQ(pcb->chip.port('B').mode(9), PinMode::input)
+      << "reset leaves the gate driver's enable floating: its resistor holds it low";
+}
+
+TEST(Image, AHangOfTheMainLoopEndsInAResetWithOpenGatesWithin35msAtTheSlowestLsi) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  pcb->chip.iwdg.set_lsi_Hz(17e3);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  pcb->chip.core().hang(0);
+  const double start_s = to_s(pcb->chip.now());
+  while (pcb->chip.resets() == 0 && to_s(pcb->chip.now()) < start_s + 0.1) pcb->run_for(50e-6);
+  EXPECT_EQ(pcb->chip.last_reset(), ResetCause::iwdg);
+  EXPECT_LE(to_s(pcb->chip.now()) - start_s, 35e-3);
+  EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
+  pcb->chip.core().unhang();
+  EXPECT_TRUE(pcb->arm()) << "and starts anew";
+}
+
+TEST(Image, TheFastestLsiDoesNotBiteAHealthyImage) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  pcb->chip.iwdg.set_lsi_Hz(47e3);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.1);
+  EXPECT_EQ(pcb->chip.resets(), 0);
+}
+
+TEST(Image, ASagOfTheLogicSupplyOpensTheGatesAndSavesTheHeat) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.05);
+  const auto words = pcb->chip.flash.words_programmed();
+  pcb->chip.set_supply(2.8);
+  pcb->run_for(0.002);
+  EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
+  EXPECT_EQ(pcb->chip.flash.words_programmed() - words, sizeof(h8_15d::HeatRecord) / 4);
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, APowerCutInEachWordOfTheJournalLeavesTheLastRecordOrTheOneBefore) {
+  NEEDS_IMAGE(image);
+  for (int cut = 0; cut <= static_cast<int>(sizeof(h8_15d::HeatRecord) / 4); ++cut) {
+    auto pcb = board();
+    pcb->run_for(0.03);
+    pcb->chip.set_supply(2.8);
+    pcb->run_for(0.002);  // record 1 is whole
+    pcb->chip.set_supply(3.3);
+    pcb->power_on(5);  // VBAT gone too: only the journal remembers
+    pcb->run_for(0.03);
+    EXPECT_EQ(pcb->door().restored, 2u);
+    const auto words = pcb->chip.flash.words_programmed();
+    pcb->chip.set_supply(2.8);
+    for (int i = 0; i < 4000 && pcb->chip.flash.words_programmed() < words + static_cast<std::uint64_t>(cut); ++i)
+      pcb->chip.run_for(1e-6);
+    pcb->chip.flash.power_lost(pcb->chip.now() - from_s(8e-6), 1234u + static_cast<std::uint32_t>(cut));
+    pcb->chip.set_supply(3.3);
+    pcb->power_on(6);
+    pcb->run_for(0.03);
+    EXPECT_EQ(pcb->door().restored, 2u) << "cut in word " << cut;
+  }
+}
+
+}  // namespace
+}  // namespace image_tests
