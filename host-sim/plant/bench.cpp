@@ -32,12 +32,13 @@ AxisDesign axis_from_sheet(const wire::Motor& sheet, const HeatOptions& options)
   return {motor_from_sheet(sheet), heat_from_sheet(sheet, options), {}};
 }
 
-Bench::Axis::Axis(const BenchDesign& design, const AxisDesign& axis, std::uint64_t seed)
-    : motor(axis.motor, 1 / design.bridge.pwm_Hz),
+Bench::Axis::Axis(const BenchDesign& design, int index, std::uint64_t seed)
+    : motor(design.axes[index].motor, 1 / design.bridge.pwm_Hz),
       bridge(design.bridge),
-      stove(axis.heat, axis.hidden, seed),
-      hidden(axis.hidden),
+      stove(design.axes[index].heat, design.axes[index].hidden, seed),
+      hidden(design.axes[index].hidden),
       phase_ohm{} {
+  motor.place(design.start_angle_rad[index], 0);
   stove.soak(design.start_degC);
   stove.around = {.ambient_degC = design.ambient_degC,
                   .coolant_degC = design.ambient_degC,
@@ -50,7 +51,7 @@ Bench::Bench(const BenchDesign& design, std::uint64_t seed)
       design_(completed(design)),
       period_s_(1 / design.bridge.pwm_Hz),
       random_(seed),
-      axes_{Axis(design, design.axes[0], seed + 1), Axis(design, design.axes[1], seed + 2)},
+      axes_{Axis(design, 0, seed + 1), Axis(design, 1, seed + 2)},
       supply_(design.supply),
       power_stage_degC_(design.board_ambient_degC),
       bus_filter_share_(1 - std::exp(-period_s_ / design.sensors.bus_filter_s)) {
@@ -75,7 +76,7 @@ void Bench::soak(double degC) {
 
 void Bench::renew_resistance(Axis& axis) {
   const double speed_rad_per_s = std::fabs(axis.motor.speed_rad_per_s());
-  for (int k = 0; k < 3; ++k) axis.phase_ohm[static_cast<std::size_t>(k)] = axis.stove.phase_ohm(k, speed_rad_per_s);
+  for (int k = 0; k < 3; ++k) axis.phase_ohm[k] = axis.stove.phase_ohm(k, speed_rad_per_s);
   axis.motor.set_resistance(axis.phase_ohm, design_.bridge.on_resistance_ohm);
   axis.motor.set_magnet_degC(axis.stove.magnet_degC());
 }

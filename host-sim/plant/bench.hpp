@@ -48,7 +48,8 @@ struct BenchDesign {
   double start_degC = 25;                // everything soaked
   double ambient_degC = 25;
   double board_ambient_degC = 40;
-  bool encoder_knows_zero = true;  // false: the counter starts at 0 wherever the rotor stands
+  std::array<double, 2> start_angle_rad{};  // mechanical
+  bool encoder_knows_zero = true;           // false: the counter starts at 0 wherever the rotor stands
 };
 
 /// Converted readings of one axis.
@@ -115,7 +116,7 @@ class Bench {
 
  private:
   struct Axis {
-    Axis(const BenchDesign& design, const AxisDesign& axis, std::uint64_t seed);
+    Axis(const BenchDesign& design, int index, std::uint64_t seed);
     Motor motor;
     Bridge bridge;
     Stove stove;

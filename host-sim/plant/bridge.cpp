@@ -38,7 +38,7 @@ std::array<double, 3> ripple_share(const std::array<double, 3>& ratio) {
 }
 
 void Bridge::advance(Motor& motor, const hal::Duty& duty, double bus_V, const std::array<double, 3>& winding_ohm) {
-  const double period_s = 1 / design_.pwm_Hz;
+  const double period_s = period_s_;
   short_A_ = 0;
   if (!duty.on) {
     const std::array<double, 3> emf_V = motor.back_emf_V();
@@ -65,15 +65,16 @@ void Bridge::advance(Motor& motor, const hal::Duty& duty, double bus_V, const st
 
 void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
                       const std::array<double, 3>& winding_ohm) {
-  const double period_s = 1 / design_.pwm_Hz;
+  const double period_s = period_s_;
   const double dead = design_.dead_time_s * design_.pwm_Hz;
   const std::array<double, 3> current_A = motor.current_A();
+  const double per_soft = 1 / soft_A_;
   std::array<double, 3> effective, drop_V, terminal_V;
   for (int k = 0; k < 3; ++k) {
     effective[k] = ratio[k];
     drop_V[k] = 0;
     if (ratio[k] > 0 && ratio[k] < 1) {  // no edges, no dead time
-      const double sign = std::clamp(current_A[k] / soft_A_, -1.0, 1.0);
+      const double sign = std::clamp(current_A[k] * per_soft, -1.0, 1.0);
       effective[k] = std::clamp(ratio[k] - dead * sign, 0.0, 1.0);
       drop_V[k] = design_.diode_V * 2 * dead * sign;
     }
@@ -87,7 +88,7 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
     work_.heat_J += period_s * mean_A[k] * drop_V[k];
   }
   if (open_phases != 0) return;
-  const double unit_A = bus_V * period_s / std::sqrt(motor.design().inductance_d_H * motor.design().inductance_q_H);
+  const double unit_A = bus_V * period_s / motor.mean_inductance_H();
   const std::array<double, 3> share = ripple_share(ratio);
   double squared_A2 = 0;
   for (int k = 0; k < 3; ++k) {
@@ -100,7 +101,7 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
 
 void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double bus_V,
                       const std::array<double, 3>& winding_ohm) {
-  const double period_s = 1 / design_.pwm_Hz;
+  const double period_s = period_s_;
   std::array<double, pieces + 12> edge_s;
   int edges = 0;
   for (int part = 1; part <= pieces; ++part) edge_s[edges++] = period_s * part / pieces;

@@ -40,7 +40,7 @@ std::array<double, 3> ripple_share(const std::array<double, 3>& ratio);
 
 class Bridge {
  public:
-  explicit Bridge(const BridgeDesign& design) : design_(design) {}
+  explicit Bridge(const BridgeDesign& design) : design_(design), period_s_(1 / design.pwm_Hz) {}
 
   /// One PWM period.
   void advance(Motor& motor, const hal::Duty& duty, double bus_V, const std::array<double, 3>& winding_ohm);
@@ -68,6 +68,7 @@ class Bridge {
   void carry_short(const std::array<double, 3>& ratio, double bus_V);
 
   BridgeDesign design_;
+  double period_s_;
   BridgeWork work_;
   double soft_A_ = 1e-3;  // below this current the ripple crosses zero and the dead time errs less
   double short_A_ = 0;

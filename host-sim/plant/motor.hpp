@@ -2,13 +2,12 @@
 // A permanent-magnet synchronous motor made of numbers: winding, magnet, iron, rotor, load. Double precision.
 //
 // In: the voltages at its three terminals (or which of them are open) for a step; out: currents, torque, speed, angle
-// and where every joule went. State: phase currents (stator frame), speed, angle. Knows nothing of bridge, sensors,
-// heat.
+// and where every joule went. State: phase currents (stator frame), speed, angle. Knows no bridge, sensor or heat.
 //
-// Integrator: implicit midpoint on the stator flux linkages. It is second order, stable for any step, takes one sine
-// and one cosine, is exact in the kinematics of the back-EMF, and its discrete torque times angle equals its discrete
-// EMF times current to rounding, so no energy is invented. `fitted` scales the inductance by (x/2)/tanh(x/2), x = hR/L:
-// then the response to a constant voltage is the exact exponential, even where a whole PWM period is longer than L/R.
+// Integrator: implicit midpoint on the stator flux linkages. It is second order, stable for any step, cheap, exact in
+// the kinematics of the back-EMF, and its discrete torque times angle equals its discrete EMF times current to
+// rounding, so no energy is invented. `fitted` scales the inductance by (x/2)/tanh(x/2), x = hR/L: then the response to
+// a constant voltage is the exact exponential, even where a whole PWM period is longer than L/R.
 #pragma once
 
 #include <array>
@@ -73,6 +72,7 @@ class Motor {
 
   /// Winding resistance of each phase and what the bridge adds in series.
   void set_resistance(const std::array<double, 3>& winding_ohm, double series_ohm);
+  double mean_inductance_H() const { return mean_inductance_H_; }
   void set_magnet_degC(double magnet_degC);
   void place(double angle_rad, double speed_rad_per_s);  // mechanical
 
@@ -124,13 +124,14 @@ class Motor {
   Push push_freely(double h_s) const;
   void book_forced(double travel_rad);
   double flux_share() const;
+  void refresh();
   double flux_of(double current_A, double inductance_H) const;
   double incremental_H(double current_A, double inductance_H) const;
   double field_energy_of(double current_A, double inductance_H) const;
 
   MotorDesign design_;
   double period_s_;
-  double fitted_d_H_, fitted_q_H_;
+  double fitted_d_H_, fitted_q_H_, mean_inductance_H_;
   std::array<double, 3> winding_ohm_{}, total_ohm_{};
   double r_aa_ohm_ = 0, r_ab_ohm_ = 0, r_bb_ohm_ = 0;  // of the three phases, seen in the stator frame
   double magnet_Wb_;

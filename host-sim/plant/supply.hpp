@@ -59,7 +59,11 @@ class Supply {
 
   void conduct(double h_s, double load_J) {
     const double r_ohm = design_.resistance_ohm, tau_s = r_ohm * design_.capacitor_F, x = h_s / tau_s;
-    const double decay = std::exp(-x), mean_decay = (1 - decay) / x;
+    if (x != last_x_) {  // the same at every whole period
+      last_x_ = x;
+      last_decay_ = std::exp(-x);
+    }
+    const double decay = last_decay_, mean_decay = (1 - decay) / x;
     // Mean bus voltage = a - b i; load joules = h i (a - b i).
     const double a_V = design_.open_V + (bus_V_ - design_.open_V) * mean_decay, b_ohm = r_ohm * (1 - mean_decay);
     const double root = std::max(a_V * a_V - 4 * b_ohm * load_J / h_s, 0.0);
@@ -97,6 +101,7 @@ class Supply {
   SupplyDesign design_;
   double bus_V_;
   double current_A_ = 0;
+  double last_x_ = 0, last_decay_ = 1;
   SupplyWork work_;
 };
 

@@ -145,6 +145,26 @@ TEST(Bench, SameSeedSameBitsOtherSeedOtherNoise) {
   EXPECT_EQ(one.truth(0).hottest_degC, other.truth(0).hottest_degC);  // noise is in the sensors, not in the plant
 }
 
+TEST(Bench, HiddenEffectsReachTheRawValues) {
+  BenchDesign design = plant_tests::bench_design(plant_tests::small_motor());
+  design.sensors.current_noise_A = design.sensors.ntc_noise_K = 0;
+  design.axes[0].hidden.current_offset_A = 2;
+  design.axes[0].hidden.sensor_offset_K = 5;
+  design.axes[1].hidden.current_gain = 1.25;
+  design.axes[1].hidden.neighbour_W_per_K = 5;
+  Bench bench(design, 1);
+  bench.load(1).mode = Load::Mode::locked;
+  bench.stove(0).soak(90);
+  for (int n = 0; n < 4000; ++n) bench.advance_period({released, hal::Duty{{0.6f, 0.5f, 0.5f}, true}});
+  const host_sim::SensorDesign& s = design.sensors;
+  EXPECT_NEAR(bench.raw(0).current_counts[0], 2048 - 2 / s.current_A_per_count, 0.51);
+  EXPECT_NEAR(bench.raw(0).current_counts[1], 2048 + 1 / s.current_A_per_count, 0.51);
+  EXPECT_NEAR(bench.raw(0).housing_counts,
+              host_sim::ntc_counts(s.housing, bench.truth(0).housing_degC + 5, s.adc_full_scale), 1);
+  EXPECT_NEAR(bench.raw(1).current_counts[0], 2048 + bench.truth(1).current_A[0] / 1.25 / s.current_A_per_count, 0.51);
+  EXPECT_GT(bench.truth(1).housing_degC, 27);  // 5 W/K from a neighbour at 90 degC for 0.2 s
+}
+
 TEST(Bench, PowerStageMeetsItsRatedRiseAndPole) {
   const host_sim::BridgeDesign bridge;
   const auto stage = host_sim::power_stage_from_rating(bridge, 48);
