@@ -5,12 +5,14 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <optional>
 
 #ifdef HOTCORE_TRAP_FLOATS
 #include <cfenv>
 #endif
 
 #include "boards/host/figures.hpp"
+#include "boards/host/record.hpp"
 #include "boards/host/run_scene.hpp"
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
@@ -32,6 +34,7 @@ constexpr const char* examples =
     "  host-sim run jump --set trust=sheet       what not knowing the motor costs\n"
     "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and "
     "pictures\n"
+    "  host-sim record duty --hide seed=7        a 20 min log of a motor that is not what its sheet says\n"
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
@@ -80,6 +83,34 @@ void figures(const std::string& out, bool json) {
              json ? figures_json(paper) : figures_text(paper) + fmt::format("Written: {}\n", fmt::join(paths, " ")));
 }
 
+std::optional<std::uint64_t> seed_of(const std::string& hide) {
+  if (hide.empty()) return {};
+  const std::string digits = hide.rfind("seed=", 0) == 0 ? hide.substr(5) : "";
+  if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) {
+    throw wire::pc::UserError(wire::pc::Exit::usage, fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
+  }
+  return std::stoull(digits);
+}
+
+void record_log(RecordOptions options, const std::string& out, bool json) {
+  Recording recording;
+  {
+    Progress progress("recording");
+    options.progress = [&](double share) { progress(share); };
+    recording = record(options);
+  }
+  const std::string log = out + "/log.csv", truth = out + "/truth.json";
+  wire::pc::write_whole(log, recording.log_csv);
+  wire::pc::write_whole(truth, recording.truth_json);
+  if (json) {
+    fmt::print("{{\"log\": \"{}\", \"truth\": \"{}\", \"hottest_core_degC\": {:.1f}, \"winding_max_degC\": {:g}}}\n", log, truth,
+               recording.hottest_true_degC, recording.winding_max_degC);
+  } else {
+    fmt::print("Recorded (simulated): {}; the hottest winding was {:.1f} degC of {:g} allowed. What is hidden: {}\n", log,
+               recording.hottest_true_degC, recording.winding_max_degC, truth);
+  }
+}
+
 void list() {
   fmt::print("Scenes ({}):\n", scene_folder);
   for (const std::string& name : scene_names(scene_folder))
@@ -116,10 +147,26 @@ int main(int argc, char** argv) {
   figures_command->add_option("--out", out, "folder for the pictures")->capture_default_str();
   figures_command->add_flag("--json", json, "the numbers as JSON on standard output");
 
+  RecordOptions recording{.motor_folder = motor_folder, .scene_folder = scene_folder};
+  std::string hide;
+  CLI::App* record_command = app.add_subcommand("record", "record a log, with an effect hidden in the motor if wanted");
+  record_command->add_option("excitation", recording.excitation, "duty, designed, step, or a scene")->required();
+  record_command->add_option("--motor", recording.motor, "a name (see list) or a .toml file")->capture_default_str();
+  record_command->add_option("--minutes", recording.minutes, "length of the log")->capture_default_str()->check(CLI::Range(0.1, 1440.0));
+  record_command->add_option("--seed", recording.seed, "of excitation and noise")->capture_default_str();
+  record_command->add_option("--hide", hide, "seed=N: hide an effect drawn from seed N, and take the motor off its sheet");
+  record_command->add_flag("--thermocouple", recording.thermocouple, "a winding temperature in every line");
+  record_command->add_option("--out", out, "folder for log.csv and truth.json")->capture_default_str();
+  record_command->add_flag("--json", json, "what was recorded as JSON on standard output");
+
   try {
     app.parse(argc, argv);
     if (*run_command) run(scene, overrides, out, json);
     if (*list_command) list();
+    if (*record_command) {
+      recording.hide = seed_of(hide);
+      record_log(recording, out, json);
+    }
     if (*figures_command) figures(out, json);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;

@@ -64,6 +64,7 @@ class Wish {
 class Sums {
  public:
   void add(const firmware::FastView& fast, const host_sim::AxisTruth& truth) {
+    torque_current_A_ += static_cast<double>(fast.current_A.q);
     square_A2_ += static_cast<double>(fast.current_A.d * fast.current_A.d + fast.current_A.q * fast.current_A.q);
     speed_ += static_cast<double>(fast.rad_per_s);
     bus_V_ += static_cast<double>(fast.bus_V);
@@ -73,7 +74,7 @@ class Sums {
   }
   void write(Row& row) {
     const double n = std::max(count_, 1);
-    row.current_A = root_3_over_2 * std::sqrt(square_A2_ / n);
+    row.current_A = std::copysign(root_3_over_2 * std::sqrt(square_A2_ / n), torque_current_A_);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
@@ -82,7 +83,7 @@ class Sums {
   }
 
  private:
-  double square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
+  double torque_current_A_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
   int count_ = 0;
 };
 
@@ -92,11 +93,6 @@ host_sim::Load load_of(const Shaft& shaft) {
   if (shaft.kind == Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
   load.inertia_kg_m2 = shaft.load_inertia_kg_m2;
   return load;
-}
-
-double imposed_speed_rad_per_s(const Shaft& shaft, double time_s) {
-  return shaft.speed_rad_per_s +
-         shaft.speed_amplitude_rad_per_s * std::sin(2 * std::numbers::pi * shaft.frequency_Hz * time_s);
 }
 
 double hottest_degC(const firmware::AxisState& state) {
@@ -123,7 +119,7 @@ class Board {
         design_(plant(scene, file, options)),
         bench_(design_, scene.seed),
         doors_{AxisDoor(bench_, design_.sensors, 0), AxisDoor(bench_, design_.sensors, 1)},
-        driver_(setup(scene, limiter, file, design_)) {
+        driver_(setup(scene, limiter, file, design_, options)) {
     for (int axis = 0; axis < firmware::axis_count; ++axis) {
       bench_.load(axis) = load_of(scene.shaft);
       bench_.motor(axis).place(scene.shaft.angle_rad / file.motor.pole_pairs, 0);
@@ -135,7 +131,7 @@ class Board {
  private:
   static host_sim::BenchDesign plant(const Scene& scene, const wire::pc::MotorFile& file, const RunOptions& options);
   static firmware::DriverSetup setup(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file,
-                                     const host_sim::BenchDesign& design);
+                                     const host_sim::BenchDesign& design, const RunOptions& options);
   void period();
   void arm(int axis);
   void speak(const Trace& trace, Wish& wish, double time_s);
@@ -155,7 +151,7 @@ class Board {
 host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile& file, const RunOptions& options) {
   host_sim::BenchDesign design;
   for (host_sim::AxisDesign& axis : design.axes) {
-    axis = host_sim::axis_from_sheet(file.motor, heat_options(scene));
+    axis = host_sim::axis_from_sheet(options.plant_motor.value_or(file.motor), heat_options(scene));
     axis.hidden = options.hidden;
   }
   const firmware::BoardRating rating = rating_of(scene.board);
@@ -172,8 +168,9 @@ host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile
 }
 
 firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file,
-                                   const host_sim::BenchDesign& design) {
-  wire::Motor known = host_sim::true_sheet(file.motor, design.axes[0].heat);
+                                   const host_sim::BenchDesign& design, const RunOptions& options) {
+  wire::Motor known = options.plant_motor ? file.motor : host_sim::true_sheet(file.motor, design.axes[0].heat);
+  known.winding_max_degC -= options.winding_margin_K;
   if (limiter != Limiter::governor) known.winding_max_degC = no_limit_degC;
   const firmware::BoardRating rating = rating_of(scene.board);
   firmware::AxisSetup axis;
@@ -198,7 +195,7 @@ void Board::period() {
       }
     }
     if (scene_.shaft.kind == Shaft::Kind::imposed) {
-      bench_.load(index).speed_rad_per_s = imposed_speed_rad_per_s(scene_.shaft, time_s);
+      bench_.load(index).speed_rad_per_s = imposed_speed_rad_per_s(scene_, time_s);
     }
   }
   bench_.advance_period(duty);
@@ -239,6 +236,7 @@ Row Board::row(int axis, double time_s, double demand) const {
   row.estimated_core_degC = hottest_degC(state);
   row.core_sigma_K = static_cast<double>(state.core_sigma_K);
   row.true_core_degC = truth.hottest_degC;
+  row.true_winding_degC = truth.winding_degC;
   row.housing_degC = static_cast<double>(slow_sample(bench_.raw(axis), design_.sensors).housing.value_degC);
   row.true_housing_degC = truth.housing_degC;
   row.ambient_degC = scene_.ambient_degC;
@@ -303,7 +301,7 @@ Result run_scene(const Scene& scene, const RunOptions& options) {
                 .optimal_impulse_As = 0,
                 .traces = {}};
 
-  if (scene.shaft.kind != Shaft::Kind::locked) {
+  if (scene.shaft.kind != Shaft::Kind::locked && scene.program.empty()) {
     const wire::Motor known =
         host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
     result.optimal_impulse_As = optimal_impulse_As(scene, known, static_cast<double>(rating_of(scene.board).peak_A));

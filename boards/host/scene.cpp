@@ -195,6 +195,17 @@ std::string find_file(const std::string& which, const std::string& folder) {
   refuse(fmt::format("Unknown scene '{}'{} Scenes: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
 }
 
+/// The program at a time; before it begins, at rest.
+ProgramStep at(const Scene& scene, double time_s) {
+  const double place = time_s * scene.program_Hz;
+  if (place < 0) return {0, scene.program.front().speed_rad_per_s};
+  const std::size_t i = std::min(static_cast<std::size_t>(place), scene.program.size() - 1);
+  const ProgramStep &from = scene.program[i], &to = scene.program[std::min(i + 1, scene.program.size() - 1)];
+  const double share = std::min(place - static_cast<double>(i), 1.0);
+  return {from.current_A + share * (to.current_A - from.current_A),
+          from.speed_rad_per_s + share * (to.speed_rad_per_s - from.speed_rad_per_s)};
+}
+
 void expect_one_of(const char* key, const std::string& value, const std::vector<std::string>& known) {
   if (std::find(known.begin(), known.end(), value) != known.end()) return;
   refuse(fmt::format("{} = '{}' is not one of {}.", key, value, fmt::join(known, ", ")));
@@ -243,11 +254,21 @@ Scene read_scene(const std::string& which, const std::string& folder, const std:
 }
 
 double demand_A(const Scene& scene, int axis, double time_s) {
+  if (!scene.program.empty()) return axis == 0 ? at(scene, time_s).current_A : 0;
   for (const Demand& d : scene.demands) {
     if (d.axis != axis || time_s < d.from_s || time_s >= d.to_s) continue;
     return d.current_A * (1 + d.ripple_ratio * std::sin(2 * std::numbers::pi * d.frequency_Hz * time_s));
   }
   return 0;
+}
+
+double imposed_speed_rad_per_s(const Shaft& shaft, double time_s) {
+  return shaft.speed_rad_per_s +
+         shaft.speed_amplitude_rad_per_s * std::sin(2 * std::numbers::pi * shaft.frequency_Hz * time_s);
+}
+
+double imposed_speed_rad_per_s(const Scene& scene, double time_s) {
+  return scene.program.empty() ? imposed_speed_rad_per_s(scene.shaft, time_s) : at(scene, time_s).speed_rad_per_s;
 }
 
 }  // namespace boards::host

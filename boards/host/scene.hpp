@@ -38,6 +38,11 @@ struct Shaft {
   double frequency_Hz = 0;
 };
 
+/// One instant of a program: what is asked for and how fast the shaft is turned.
+struct ProgramStep {
+  double current_A, speed_rad_per_s;
+};
+
 struct Scene {
   std::string id, title, note;
   std::string motor = "ec-16-40w";
@@ -54,6 +59,8 @@ struct Scene {
   bool supply_sinks = true;  // a battery; false: a mains supply that takes nothing back
   std::vector<Limiter> limiters = {Limiter::governor};
   std::vector<Demand> demands;
+  std::vector<ProgramStep> program;  // of axis 0 instead of demands and shaft; straight lines between the steps
+  double program_Hz = 0;
   Shaft shaft;
 };
 
@@ -66,5 +73,9 @@ Scene read_scene(const std::string& which, const std::string& folder, const std:
 
 /// Demand of one axis at a time, in amperes of phase amplitude.
 double demand_A(const Scene& scene, int axis, double time_s);
+
+/// Speed of a shaft that is turned from outside.
+double imposed_speed_rad_per_s(const Shaft& shaft, double time_s);
+double imposed_speed_rad_per_s(const Scene& scene, double time_s);
 
 }  // namespace boards::host

@@ -32,6 +32,7 @@ constexpr Column columns[] = {
     {"estimated_core_degC", &Row::estimated_core_degC},
     {"core_sigma_K", &Row::core_sigma_K},
     {"true_core_degC", &Row::true_core_degC},
+    {"true_winding_degC", &Row::true_winding_degC},
     {"housing_degC", &Row::housing_degC},
     {"true_housing_degC", &Row::true_housing_degC},
     {"ambient_degC", &Row::ambient_degC},

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+#include "boards/host/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "boards/host/run_scene.hpp"
+#include "host-sim/plant/hidden_causes.hpp"
+#include "wire/pc/motor_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace boards::host {
+namespace {
+
+constexpr double program_Hz = 20, log_Hz = 10;
+constexpr double start_degC = 25;
+// How far a real motor may be off its sheet (a shipped actuator product scales sheet R1 by 1.6 to 1.8).
+constexpr double least_factor = 0.6, largest_factor = 1.8;
+constexpr double least_error_K = 3, largest_error_K = 10;  // of an estimator that does not know the effect
+// Resistance as a thermometer: a reading now and then, when the motor happens to stand still.
+constexpr double ohmmeter_K = 2, ohmmeter_every_s = 30;
+// A motor that is not known yet is kept this far below its limit: R1 x 1.8 and C1 x 0.6 at once must not burn it.
+constexpr double unknown_motor_margin_K = 40;
+
+/// Effects that cannot show on a bench with one loaded motor and this firmware: the offset is learnt away, the other
+/// motor and the frame are cold, and the clocks of one board do not differ.
+bool shows_on_a_bench(const std::string& id) {
+  return id != "current_offset" && id != "neighbour_heat" && id != "frame_conduction" && id != "clock_delay";
+}
+
+struct Truth {
+  wire::Motor motor;
+  host_sim::HiddenEffects hidden;
+  nlohmann::ordered_json json;
+};
+
+std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
+  const double length_s = options.minutes * 60, full_speed = host_sim::full_speed_rad_per_s(sheet, scene.supply_V);
+  using host_sim::Excitation;
+  const std::pair<const char*, Excitation> kinds[] = {
+      {"duty", Excitation::robot_duty}, {"designed", Excitation::designed}, {"step", Excitation::one_step}};
+  for (const auto& [name, kind] : kinds) {
+    if (options.excitation == name) return host_sim::make_excitation(kind, sheet, full_speed, length_s, program_Hz, options.seed);
+  }
+  // A scene, again and again.
+  std::vector<host_sim::Demand> demands(static_cast<std::size_t>(length_s * program_Hz));
+  for (std::size_t i = 0; i < demands.size(); ++i) {
+    const double time_s = std::fmod(static_cast<double>(i) / program_Hz, scene.seconds);
+    demands[i].current_A = demand_A(scene, 0, time_s);
+    demands[i].speed_rad_per_s = imposed_speed_rad_per_s(scene.shaft, time_s);
+  }
+  return demands;
+}
+
+Truth draw_truth(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet,
+                 const std::vector<host_sim::Demand>& demands) {
+  host_sim::Random random(*options.hide);
+  const auto factor = [&] { return std::exp(random.uniform(std::log(least_factor), std::log(largest_factor))); };
+  Truth truth{sheet, {}, {}};
+  truth.motor.R1_K_per_W *= factor();
+  truth.motor.R2_K_per_W *= factor();
+  truth.motor.C1_J_per_K *= factor();
+  truth.motor.C2_J_per_K *= factor();
+
+  std::vector<const host_sim::HiddenCause*> causes;
+  for (const host_sim::HiddenCause& cause : host_sim::hidden_causes()) {
+    if (cause.in_catalogue && shows_on_a_bench(cause.id)) causes.push_back(&cause);
+  }
+  const host_sim::HiddenCause& cause = *causes[random.next() % causes.size()];
+  host_sim::ThermalDesign design;
+  design.sheet = truth.motor;
+  const double target_K = random.uniform(least_error_K, largest_error_K);
+  const host_sim::DrawnEffect drawn =
+      host_sim::draw_effect(cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, scene.supply_V), target_K, random.next());
+  truth.hidden = drawn.hidden;
+  truth.json = {{"format", 1},
+                {"causes", {{{"id", cause.id}, {"amount", drawn.amount}, {"error_before_refit_K", drawn.error_K}}}},
+                {"motor", {{"R1_K_per_W", truth.motor.R1_K_per_W}, {"R2_K_per_W", truth.motor.R2_K_per_W},
+                           {"C1_J_per_K", truth.motor.C1_J_per_K}, {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
+  return truth;
+}
+
+}  // namespace
+
+Recording record(const RecordOptions& options) {
+  Scene scene;
+  if (options.excitation != "duty" && options.excitation != "designed" && options.excitation != "step") {
+    scene = read_scene(options.excitation, options.scene_folder, {});
+    if (scene.shaft.kind == Shaft::Kind::free) {
+      throw wire::pc::UserError(wire::pc::Exit::usage, "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with an imposed speed or a locked rotor.");
+    }
+  } else {
+    scene.motor = options.motor;
+  }
+  const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, options.motor_folder);
+  const std::vector<host_sim::Demand> demands = demands_of(options, scene, file.motor);
+
+  scene.id = "record";
+  scene.seconds = static_cast<double>(demands.size()) / program_Hz;
+  scene.log_Hz = log_Hz;
+  scene.seed = static_cast<unsigned>(options.seed);
+  scene.start_degC = start_degC;
+  scene.shaft.kind = Shaft::Kind::imposed;
+  scene.limiters = {Limiter::governor};
+  scene.program_Hz = program_Hz;
+  for (const host_sim::Demand& demand : demands) scene.program.push_back({demand.current_A, demand.speed_rad_per_s});
+
+  RunOptions run{.motor_folder = options.motor_folder, .progress = options.progress};
+  Truth truth{file.motor, {}, {{"format", 1}, {"causes", nlohmann::json::array()}}};
+  if (options.hide) {
+    truth = draw_truth(options, scene, file.motor, demands);
+    run.plant_motor = truth.motor;
+    run.hidden = truth.hidden;
+    run.winding_margin_K = unknown_motor_margin_K;
+    scene.trust = "sheet";
+  }
+  const Result result = run_scene(scene, run);
+  const Trace& trace = result.traces.at(0);
+
+  host_sim::Random noise(options.seed ^ 0x6f686d6d);
+  std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation, file.name,
+                                file.surrogate ? " (surrogate)" : "", options.seed);
+  csv += fmt::format("# current_A: direct current through two terminals that heats alike; core_degC: {}\n",
+                     options.thermocouple ? "thermocouple" : "from winding resistance, +-2 K, every 30 s");
+  csv += "time_s,current_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
+  double due_s = 0;
+  for (const Row& row : trace.rows) {
+    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, row.current_A, row.speed_rad_per_s,
+                       row.bus_V, row.bus_A, row.housing_degC, row.ambient_degC);
+    if (options.thermocouple) csv += fmt::format("{:.2f}", row.true_winding_degC);
+    else if (row.time_s >= due_s) csv += fmt::format("{:.2f}", row.true_winding_degC + ohmmeter_K * noise.gauss()), due_s += ohmmeter_every_s;
+    csv += '\n';
+  }
+  return {csv, truth.json.dump(2) + "\n", trace.hottest_true_degC, result.winding_max_degC};
+}
+
+}  // namespace boards::host

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Records a long log as a robot's would be: the firmware drives a simulated motor under protection, and the log holds
+// what sensors say. An effect drawn from a seed may be hidden in the motor; the truth goes to a file of its own.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace boards::host {
+
+struct RecordOptions {
+  std::string excitation = "duty";  // duty, designed or step; or a scene
+  std::string motor = "ec-16-40w";
+  double minutes = 20;
+  std::uint64_t seed = 1;                     // of excitation and sensor noise
+  std::optional<std::uint64_t> hide = {};     // of the hidden effect and of how far the motor is off its sheet
+  bool thermocouple = false;                  // a winding temperature in every line; otherwise a resistance reading now and then
+  std::string motor_folder, scene_folder;
+  std::function<void(double)> progress = {};
+};
+
+struct Recording {
+  std::string log_csv;
+  std::string truth_json;
+  double hottest_true_degC, winding_max_degC;
+};
+
+Recording record(const RecordOptions& options);
+
+}  // namespace boards::host
