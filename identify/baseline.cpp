@@ -73,6 +73,14 @@ void add_plots(const Problem& problem, const Fit& f, const std::string& remark, 
   }
 }
 
+void add_extended(const Problem& problem, const Fit& f, Report& report, std::size_t first) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    Replayed r = replayed(problem, f, static_cast<int>(l));
+    report.plots[first + l].extended_housing = std::move(r.housing_degC);
+    report.plots[first + l].extended_core = std::move(r.core_degC);
+  }
+}
+
 Problem first_part(const Problem& problem, double fraction) {
   Problem out = problem;
   for (Bins& log : out.logs) {

@@ -25,6 +25,9 @@ Problem last_part(const Problem& problem, double fraction);
 /// Appends what was measured and what this fit simulates, log by log.
 void add_plots(const Problem& problem, const Fit& fit, const std::string& remark, Report& report);
 
+/// The same for the extended model, into plots that are there already, from the first-th on.
+void add_extended(const Problem& problem, const Fit& fit, Report& report, std::size_t first);
+
 /// Parameter lines of base and causes.
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
 

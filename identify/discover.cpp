@@ -3,30 +3,150 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
+
+#include "identify/search.hpp"
 
 namespace identify {
 namespace {
 
-void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
-                    const Fit& f, Report& report) {
+std::string listed(const std::vector<std::string>& ids, const char* between) {
+  std::string out;
+  for (const std::string& id : ids) out += (out.empty() ? "" : between) + id;
+  return out;
+}
+
+void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held, const Fit& base, const Fit& extended,
+                    Report& report) {
+  HeldOut out;
   if (held.fraction > 0) {
-    HeldOut out;
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
-    Fit onward = f;
-    out.before = rmse_of(last_part(whole, held.fraction), onward);
+    const Problem last = last_part(whole, held.fraction);
+    out.before = rmse_of(last, base);
+    out.after = rmse_of(last, extended);
     report.held_out = out;
   } else if (!held.logs.empty()) {
-    HeldOut out;
-    out.how = fmt::format("{}; only its initial temperatures fitted", held.logs.front().name);
+    out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
     Problem other = problem_of(held.logs, motor, whole.belief.copper_per_K);
-    other.belief = whole.belief;
-    const Fit moved = transferred(other, f);
-    out.before = rmse_of(other, moved, &out.each_before);
+    // Scales and belief are those the parameters were found with; only the inputs are new.
+    const auto logs = other.logs;
+    other = whole;
+    other.logs = logs;
+    const Fit before = transferred(other, base), after = transferred(other, extended);
+    out.before = rmse_of(other, before, &out.each_before);
+    out.after = rmse_of(other, after);
     for (const Log& log : held.logs) out.names.push_back(log.name);
-    add_plots(other, moved, " (not seen by the fit)", report);
+    add_plots(other, before, " (not seen by the fit)", report);
+    add_extended(other, after, report, report.plots.size() - held.logs.size());
     report.held_out = out;
   }
+}
+
+std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
+  std::vector<ParameterLine> out;
+  const Eigen::VectorXd sd = f.std_errors();
+  Eigen::Index at = base_count;
+  for (std::size_t c = 0; c < f.chosen.size(); ++c) {
+    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[c].cause)];
+    for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
+      if (c != which) continue;
+      const Parameter& parameter = cause.parameters[p];
+      ParameterLine line;
+      line.name = parameter.name;
+      line.unit = parameter.unit;
+      line.value = parameter_value(problem, cause, static_cast<int>(p), f.x[at]);
+      const double slope = parameter.logarithmic ? line.value : problem.scale(parameter.scale, cause.drive);
+      line.std_error = std::abs(slope) * sd[at];
+      line.at_bound = f.at_bound[static_cast<std::size_t>(at)];
+      line.determined = !line.at_bound && sd[at] < 0.7 * parameter.typical;
+      out.push_back(line);
+    }
+  }
+  return out;
+}
+
+void tell(const Problem& problem, const Search& found, Report& report) {
+  report.verdict = word(found.verdict);
+  report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
+  std::set<std::string> seen;
+  for (const Candidate& c : found.singles) {
+    const std::string id = ids_of(c.fit.chosen).front();
+    if (!seen.insert(id).second) continue;
+    const bool tied = std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return std::find(ids.begin(), ids.end(), id) != ids.end(); });
+    const bool named = found.verdict == Verdict::explained || found.verdict == Verdict::partly_explained;
+    const bool chosen = named && !found.tied.empty() && std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
+    report.ladder.push_back({id, causes()[static_cast<std::size_t>(c.fit.chosen.front().cause)].name, c.gain, chosen, tied && !chosen});
+  }
+  const Fit& f = found.chosen.fit;
+  if (found.verdict == Verdict::adequate || found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient) return;
+  for (std::size_t i = 0; i < f.chosen.size(); ++i) {
+    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[i].cause)];
+    CauseLine line{cause.id, cause.name, cause.signature, found.chosen.gain, cause_lines(problem, f, i), {}};
+    if (f.chosen[i].log >= 0) line.name += fmt::format("; here: {}", problem.logs[static_cast<std::size_t>(f.chosen[i].log)].name);
+    // What stands in its place in the other sets of the tie, and how far behind.
+    for (const Candidate& c : found.sets) {
+      if (!c.tied) continue;
+      for (const std::string& id : ids_of(c.fit.chosen)) {
+        const bool mine = std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
+        const bool there = std::any_of(line.rivals.begin(), line.rivals.end(), [&](const Rival& r) { return r.id == id; });
+        const auto without = ids_of(c.fit.chosen);
+        const bool replaces = std::find(without.begin(), without.end(), cause.id) == without.end();
+        if (!mine && !there && replaces) line.rivals.push_back({id, found.chosen.gain - c.gain});
+      }
+    }
+    report.causes.push_back(line);
+  }
+}
+
+std::string sentence(const Search& found, const Report& r) {
+  const Rmse& e = r.baseline_rmse;
+  const bool core = !std::isnan(e.core_K);
+  const std::string miss = fmt::format("the two-resistor model misses the {} by {:.2f} K rms", core ? "winding" : "housing", core ? e.core_K : e.housing_K);
+  const auto after = [&] {
+    return fmt::format("{:.2f} K", core ? r.extended_rmse.core_K : r.extended_rmse.housing_K);
+  };
+  switch (found.verdict) {
+    case Verdict::adequate: return fmt::format("The two-resistor model is adequate: {}, no more than the noise explains.", miss.substr(4));
+    case Verdict::explained: return fmt::format("The motor behaves like {}: {}, with it {}.", listed(found.tied.front(), " and "), miss, after());
+    case Verdict::partly_explained:
+      return fmt::format("The motor behaves mostly like {}: {}, with it {}; something smaller remains.", listed(found.tied.front(), " and "), miss, after());
+    case Verdict::ambiguous: {
+      std::string sets;
+      for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i) sets += (i > 0 ? ", or " : "") + listed(found.tied[i], " and ");
+      return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}{}.", miss, sets,
+                         found.tied.size() > 4 ? fmt::format(", or {} more", found.tied.size() - 4) : "");
+    }
+    case Verdict::unknown_cause: return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
+    case Verdict::insufficient: return "This log is too poor to say what the simulation gets wrong.";
+  }
+  return "";
+}
+
+/// Why a log cannot bear a verdict; empty when it can.
+std::string too_poor(const Problem& problem, const Fit& base) {
+  double shortest = 1e300, span = 0;
+  for (const Bins& log : problem.logs) {
+    if (log.missing_share > 0.35) return fmt::format("{}: {:.0f} % of the readings are missing or frozen.", log.name, 100 * log.missing_share);
+    if (log.gap_share > 0.3) return fmt::format("{}: gaps make up {:.0f} % of its time.", log.name, 100 * log.gap_share);
+    double low = 1e300, high = -1e300;
+    for (const Bin& bin : log.bins) {
+      const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+      if (!std::isnan(T)) low = std::min(low, T), high = std::max(high, T);
+    }
+    span = std::max(span, high - low);
+    shortest = std::min(shortest, log.duration_s());
+  }
+  if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
+  const Physical p = physical(problem, base.x);
+  double longest = 0;
+  for (const Bins& log : problem.logs) longest = std::max(longest, log.duration_s());
+  const double housing_s = p.R2_K_per_W * p.C2_J_per_K;
+  if (longest < 0.25 * housing_s) {
+    return fmt::format("The log lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.", longest, housing_s);
+  }
+  return "";
 }
 
 }  // namespace
@@ -36,20 +156,28 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   const Problem whole = problem_of(logs, motor);
   const Problem problem = held.fraction > 0 ? first_part(whole, held.fraction) : whole;
   const Fit base = judge_baseline(problem, logs, motor, report);
-  score_held_out(whole, motor, held, base, report);
-  const bool adequate = report.structure.housing.ratio < 1.3;
-  report.verdict = adequate ? "adequate" : "unknown_cause";
-  const Rmse& e = report.baseline_rmse;
-  const bool core = !std::isnan(e.core_K);
-  report.sentence =
-      adequate
-          ? fmt::format("The two-resistor model is adequate: it misses the {} by {:.2f} K rms, no more than the noise.",
-                        core ? "winding" : "housing", core ? e.core_K : e.housing_K)
-          : fmt::format(
-                "The two-resistor model is wrong: it misses the {} by {:.1f} K rms ({:.1f} K at worst), {:.1f} times "
-                "what noise explains.",
-                core ? "winding" : "housing", core ? e.core_K : e.housing_K, core ? e.core_worst_K : e.housing_worst_K,
-                report.structure.housing.ratio);
+  report.reasoning.push_back(problem.noise.idle_s > 60
+                                 ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.", problem.noise.housing_white_K,
+                                               problem.noise.housing_slow_K, problem.noise.idle_s)
+                                 : fmt::format("Noise of a housing reading: {:.3f} K white from its differences; too little rest to see the slow part, {:.3f} K assumed.",
+                                               problem.noise.housing_white_K, problem.noise.housing_slow_K));
+  const std::string poor = too_poor(problem, base);
+  Search found;
+  if (!poor.empty()) {
+    found.chosen.fit = base;
+    report.verdict = word(Verdict::insufficient);
+    report.sentence = "This log is too poor to say what the simulation gets wrong. " + poor;
+    report.reasoning.push_back(poor);
+  } else {
+    found = search(problem);
+    const bool extended = !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
+    if (!extended) found.chosen.fit = base;
+    report.extended_rmse = rmse_of(problem, found.chosen.fit);
+    tell(problem, found, report);
+    if (extended) add_extended(problem, found.chosen.fit, report, 0);
+    report.sentence = sentence(found, report);
+  }
+  score_held_out(whole, motor, held, base, found.chosen.fit, report);
   return report;
 }
 

@@ -365,7 +365,10 @@ Fit transferred(const Problem& other, const Fit& from) {
   const Eigen::Index shared = base_count + from.cause_coordinates();
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     Coordinate& ci = c[static_cast<std::size_t>(i)];
-    if (i < shared) ci.start = ci.prior = ci.low = ci.high = from.x[i];
+    if (i < shared) ci.start = from.x[i];
+    // Initial temperatures come from the first readings and nothing later: fitted to a whole log that the model cannot
+    // follow, they would bend it.
+    ci.prior = ci.low = ci.high = ci.start;
     x[i] = ci.start;
   }
   return descend(other, from.chosen, c, x, 30);

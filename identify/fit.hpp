@@ -37,7 +37,8 @@ struct Fit {
 /// when its list is a beginning of this one) are the first start.
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* warm = nullptr);
 
-/// The same model on other logs of the motor: base and causes held as in `from`, only the initial temperatures fitted.
+/// The same model on other logs of the motor: base and causes held as in `from`, initial temperatures from the
+/// first readings.
 Fit transferred(const Problem& other, const Fit& from);
 
 /// What a fit simulates for one log: readings at every bin (also where nothing was measured) and the raw residuals.

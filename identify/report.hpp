@@ -83,7 +83,7 @@ struct Report {
   std::vector<std::string> checks;  // gradient, residual, identifiability: passed or not, in words
   bool converged = false;
   std::vector<ParameterLine> baseline;
-  Rmse baseline_rmse;
+  Rmse baseline_rmse, extended_rmse;
   Structure structure;
   std::vector<Variant> variants;
   std::vector<std::string> loose;  // directions that this data does not determine, in words

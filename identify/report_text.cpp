@@ -89,6 +89,7 @@ std::string as_text(const Report& r, bool explain) {
     for (const ParameterLine& p : c.parameters) s += line_of(p);
     for (const Rival& rival : c.rivals) s += fmt::format("  rival: {} ({:+.1f})\n", rival.id, rival.delta_bic);
   }
+  if (!r.causes.empty()) s += "\nWith it the model misses by: " + rmse(r.extended_rmse) + "\n";
   if (r.held_out) {
     s += fmt::format("\nOn data it has not seen ({})\n  before: {}\n", r.held_out->how, rmse(r.held_out->before));
     for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i) {
