@@ -100,7 +100,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
   };
   switch (cause.edit) {
     case Edit::source:
-      set.sources[set.source_count++] = {static_cast<std::int8_t>(cause.node), cause.drive, k[0], S(0)};
+      // What adds to the copper loss grows with temperature as copper does.
+      set.sources[set.source_count++] = {
+          static_cast<std::int8_t>(cause.node), cause.drive, k[0],
+          cause.drive == thermal::Drive::current2_speed2 ? set.sources[0].coefficient_per_K : S(0)};
       break;
     case Edit::coefficient:
       set.sources[0].coefficient_per_K = k[0];

@@ -124,10 +124,10 @@ const std::vector<Cause>& causes() {
            {{"gain error", "", Scale::one, -0.4, 0.4, 0.08}}, "differences grow with temperature",
            "sensor_offset, copper_coefficient", "winding readings over a wide range"),
       edit("ambient_drift", "the ambient is not what was recorded and drifts", Edit::drift, Needs::nothing,
-           {{"drift", "K/s", Scale::one, -0.02, 0.02, 0.004}}, "a slow straight drift",
+           {{"drift", "K/s", Scale::one, -0.05, 0.05, 0.006}}, "a slow straight drift",
            "third_mass, cooling_change, constant_heat", "an ambient sensor beside the motor; rest at the end"),
       edit("stall_imbalance", "the standing rotor heats one phase more than the mean", Edit::stall_share, Needs::speed,
-           {{"share", "", Scale::one, 0, 1, 0.4}}, "a stall is hotter than the mean current says", "hot_spot",
+           {{"share", "", Scale::one, 0, 1.5, 0.5}}, "a stall is hotter than the mean current says", "hot_spot",
            "stall at two angles a quarter of an electrical turn apart"),
   };
   return table;

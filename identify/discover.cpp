@@ -18,8 +18,8 @@ std::string listed(const std::vector<std::string>& ids, const char* between) {
   return out;
 }
 
-void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held, const Fit& base, const Fit& extended,
-                    Report& report) {
+void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                    const Fit& base, const Fit& extended, Report& report) {
   HeldOut out;
   if (held.fraction > 0) {
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
@@ -74,23 +74,31 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   for (const Candidate& c : found.singles) {
     const std::string id = ids_of(c.fit.chosen).front();
     if (!seen.insert(id).second) continue;
-    const bool tied = std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return std::find(ids.begin(), ids.end(), id) != ids.end(); });
+    const bool tied = std::any_of(found.tied.begin(), found.tied.end(),
+                                  [&](const auto& ids) { return std::find(ids.begin(), ids.end(), id) != ids.end(); });
     const bool named = found.verdict == Verdict::explained || found.verdict == Verdict::partly_explained;
-    const bool chosen = named && !found.tied.empty() && std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
-    report.ladder.push_back({id, causes()[static_cast<std::size_t>(c.fit.chosen.front().cause)].name, c.gain, chosen, tied && !chosen});
+    const bool chosen = named && !found.tied.empty() &&
+                        std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
+    report.ladder.push_back(
+        {id, causes()[static_cast<std::size_t>(c.fit.chosen.front().cause)].name, c.gain, chosen, tied && !chosen});
   }
   const Fit& f = found.chosen.fit;
-  if (found.verdict == Verdict::adequate || found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient) return;
+  if (found.verdict == Verdict::adequate || found.verdict == Verdict::unknown_cause ||
+      found.verdict == Verdict::insufficient)
+    return;
   for (std::size_t i = 0; i < f.chosen.size(); ++i) {
     const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[i].cause)];
     CauseLine line{cause.id, cause.name, cause.signature, found.chosen.gain, cause_lines(problem, f, i), {}};
-    if (f.chosen[i].log >= 0) line.name += fmt::format("; here: {}", problem.logs[static_cast<std::size_t>(f.chosen[i].log)].name);
+    if (f.chosen[i].log >= 0)
+      line.name += fmt::format("; here: {}", problem.logs[static_cast<std::size_t>(f.chosen[i].log)].name);
     // What stands in its place in the other sets of the tie, and how far behind.
     for (const Candidate& c : found.sets) {
       if (!c.tied) continue;
       for (const std::string& id : ids_of(c.fit.chosen)) {
-        const bool mine = std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
-        const bool there = std::any_of(line.rivals.begin(), line.rivals.end(), [&](const Rival& r) { return r.id == id; });
+        const bool mine =
+            std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
+        const bool there =
+            std::any_of(line.rivals.begin(), line.rivals.end(), [&](const Rival& r) { return r.id == id; });
         const auto without = ids_of(c.fit.chosen);
         const bool replaces = std::find(without.begin(), without.end(), cause.id) == without.end();
         if (!mine && !there && replaces) line.rivals.push_back({id, found.chosen.gain - c.gain});
@@ -103,23 +111,29 @@ void tell(const Problem& problem, const Search& found, Report& report) {
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   const bool core = !std::isnan(e.core_K);
-  const std::string miss = fmt::format("the two-resistor model misses the {} by {:.2f} K rms", core ? "winding" : "housing", core ? e.core_K : e.housing_K);
-  const auto after = [&] {
-    return fmt::format("{:.2f} K", core ? r.extended_rmse.core_K : r.extended_rmse.housing_K);
-  };
+  const std::string miss = fmt::format("the two-resistor model misses the {} by {:.2f} K rms",
+                                       core ? "winding" : "housing", core ? e.core_K : e.housing_K);
+  const auto after = [&] { return fmt::format("{:.2f} K", core ? r.extended_rmse.core_K : r.extended_rmse.housing_K); };
   switch (found.verdict) {
-    case Verdict::adequate: return fmt::format("The two-resistor model is adequate: {}, no more than the noise explains.", miss.substr(4));
-    case Verdict::explained: return fmt::format("The motor behaves like {}: {}, with it {}.", listed(found.tied.front(), " and "), miss, after());
+    case Verdict::adequate:
+      return fmt::format("The two-resistor model is adequate: {}, no more than the noise explains.", miss.substr(4));
+    case Verdict::explained:
+      return fmt::format("The motor behaves like {}: {}, with it {}.", listed(found.tied.front(), " and "), miss,
+                         after());
     case Verdict::partly_explained:
-      return fmt::format("The motor behaves mostly like {}: {}, with it {}; something smaller remains.", listed(found.tied.front(), " and "), miss, after());
+      return fmt::format("The motor behaves mostly like {}: {}, with it {}; something smaller remains.",
+                         listed(found.tied.front(), " and "), miss, after());
     case Verdict::ambiguous: {
       std::string sets;
-      for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i) sets += (i > 0 ? ", or " : "") + listed(found.tied[i], " and ");
+      for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i)
+        sets += (i > 0 ? ", or " : "") + listed(found.tied[i], " and ");
       return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}{}.", miss, sets,
                          found.tied.size() > 4 ? fmt::format(", or {} more", found.tied.size() - 4) : "");
     }
-    case Verdict::unknown_cause: return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
-    case Verdict::insufficient: return "This log is too poor to say what the simulation gets wrong.";
+    case Verdict::unknown_cause:
+      return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
+    case Verdict::insufficient:
+      return "This log is too poor to say what the simulation gets wrong.";
   }
   return "";
 }
@@ -128,8 +142,10 @@ std::string sentence(const Search& found, const Report& r) {
 std::string too_poor(const Problem& problem, const Fit& base) {
   double shortest = 1e300, span = 0;
   for (const Bins& log : problem.logs) {
-    if (log.missing_share > 0.35) return fmt::format("{}: {:.0f} % of the readings are missing or frozen.", log.name, 100 * log.missing_share);
-    if (log.gap_share > 0.3) return fmt::format("{}: gaps make up {:.0f} % of its time.", log.name, 100 * log.gap_share);
+    if (log.missing_share > 0.35)
+      return fmt::format("{}: {:.0f} % of the readings are missing or frozen.", log.name, 100 * log.missing_share);
+    if (log.gap_share > 0.3)
+      return fmt::format("{}: gaps make up {:.0f} % of its time.", log.name, 100 * log.gap_share);
     double low = 1e300, high = -1e300;
     for (const Bin& bin : log.bins) {
       const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
@@ -144,7 +160,9 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   for (const Bins& log : problem.logs) longest = std::max(longest, log.duration_s());
   const double housing_s = p.R2_K_per_W * p.C2_J_per_K;
   if (longest < 0.25 * housing_s) {
-    return fmt::format("The log lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.", longest, housing_s);
+    return fmt::format(
+        "The log lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.",
+        longest, housing_s);
   }
   return "";
 }
@@ -156,11 +174,13 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   const Problem whole = problem_of(logs, motor);
   const Problem problem = held.fraction > 0 ? first_part(whole, held.fraction) : whole;
   const Fit base = judge_baseline(problem, logs, motor, report);
-  report.reasoning.push_back(problem.noise.idle_s > 60
-                                 ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.", problem.noise.housing_white_K,
-                                               problem.noise.housing_slow_K, problem.noise.idle_s)
-                                 : fmt::format("Noise of a housing reading: {:.3f} K white from its differences; too little rest to see the slow part, {:.3f} K assumed.",
-                                               problem.noise.housing_white_K, problem.noise.housing_slow_K));
+  report.reasoning.push_back(
+      problem.noise.idle_s > 60
+          ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.",
+                        problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.idle_s)
+          : fmt::format("Noise of a housing reading: {:.3f} K white from its differences; too little rest to see the "
+                        "slow part, {:.3f} K assumed.",
+                        problem.noise.housing_white_K, problem.noise.housing_slow_K));
   const std::string poor = too_poor(problem, base);
   Search found;
   if (!poor.empty()) {

@@ -308,7 +308,7 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
 
-double Fit::bic() const { return 2 * misfit + static_cast<double>(x.size()) * std::log(std::max(2, readings)); }
+double Fit::bic() const { return 2 * cost + static_cast<double>(x.size()) * std::log(std::max(2, readings)); }
 
 Eigen::VectorXd Fit::std_errors() const {
   Eigen::MatrixXd A = information;
@@ -329,7 +329,7 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* wa
   for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
   const int own = coordinates_of(chosen);
   int shared = 0;
-  if (warm != nullptr) {
+  if (warm != nullptr) {  // one list of causes is a beginning of the other
     shared = std::min(warm->cause_coordinates(), own);
     x.head(base_count + shared) = warm->x.head(base_count + shared);
     x.tail(n - base_count - own) = warm->x.tail(warm->x.size() - base_count - warm->cause_coordinates());
@@ -347,6 +347,10 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* wa
     for (const double shift : {0.0, -2.0})
       starts.push_back(
           {c[static_cast<std::size_t>(first)].start + shift, c[static_cast<std::size_t>(first) + 1].start - shift / 2});
+  } else if (last.edit == Edit::sensor_lag) {
+    starts = {{3}, {30}, {75}};
+  } else if (last.edit == Edit::delay) {
+    starts = {{2}, {20}, {-10}};
   } else {
     starts = {{c[static_cast<std::size_t>(first)].start + 0.1 * c[static_cast<std::size_t>(first)].sd}};
   }
@@ -356,7 +360,7 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* wa
     Fit f = descend(problem, chosen, c, x, 40);
     if (f.cost < best.cost) best = std::move(f);
   }
-  return best;
+  return best.settled || best.x.size() == 0 ? best : descend(problem, chosen, c, best.x, 40);
 }
 
 Fit transferred(const Problem& other, const Fit& from) {

@@ -27,13 +27,20 @@ Dual<N> rising(double time_s, const Dual<N>& from_s, double width_s) {
   return Dual<N>::chain(from_s, s, -s * (1 - s) / width_s);
 }
 
-/// Drive d at a place between bins, for clocks that are apart.
-inline double feature(const Bins& log, double place, int d) {
-  if (place <= 0) return log.bins.front().input.drive[d];
-  const auto i = static_cast<std::size_t>(place);
-  if (i + 1 >= log.bins.size()) return log.bins.back().input.drive[d];
-  const double a = log.bins[i].input.drive[d], b = log.bins[i + 1].input.drive[d];
-  return a + (place - static_cast<double>(i)) * (b - a);
+/// Drive d at a place between bins and its slope per bin, for clocks that are apart: a quadratic spline, so that the
+/// slope has no jump at which a fit would stick. It spreads a step over one bin more.
+struct Moved {
+  double value, slope;
+};
+inline Moved moved(const Bins& log, double place, int d) {
+  const auto last = static_cast<double>(log.bins.size() - 1);
+  const double nearest = std::round(place), f = place - nearest;
+  const auto at = [&](double i) {
+    return log.bins[static_cast<std::size_t>(i < 0 ? 0 : i > last ? last : i)].input.drive[d];
+  };
+  const double before = at(nearest - 1), here = at(nearest), after = at(nearest + 1);
+  return {0.5 * (0.5 - f) * (0.5 - f) * before + (0.75 - f * f) * here + 0.5 * (0.5 + f) * (0.5 + f) * after,
+          -(0.5 - f) * before - 2 * f * here + (0.5 + f) * after};
 }
 
 // A conductance that changes at a moment is written as two sources, since the links of a set are constant: with
@@ -63,8 +70,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
   if (model.delayed) {
     const double place = static_cast<double>(k) - value_of(model.delay_s) / h;
     for (int d = 0; d < thermal::drive_count; ++d) {
-      const double slope = (feature(log, place + 0.5, d) - feature(log, place - 0.5, d)) / h;
-      in.drive[d] = (model.delay_s - value_of(model.delay_s)) * -slope + feature(log, place, d);
+      const Moved m = moved(log, place, d);
+      in.drive[d] = (model.delay_s - value_of(model.delay_s)) * (-m.slope / h) + m.value;
     }
   } else {
     for (int d = 0; d < thermal::drive_count; ++d) in.drive[d] = S(bin.input.drive[d]);

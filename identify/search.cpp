@@ -10,7 +10,8 @@ namespace identify {
 namespace {
 
 constexpr std::size_t most_causes = 3;
-constexpr std::size_t beam = 4;  // sets kept when one more cause is tried: the best first cause is not always in the best pair
+constexpr std::size_t beam =
+    4;  // sets kept when one more cause is tried: the best first cause is not always in the best pair
 
 double ratio_of(const Fit& f) { return std::sqrt(2 * f.misfit / std::max(1, f.readings)); }
 
@@ -29,7 +30,8 @@ void sort(std::vector<Candidate>& list) {
 }
 
 bool same_set(const std::vector<Chosen>& a, const std::vector<Chosen>& b) {
-  return a.size() == b.size() && std::all_of(a.begin(), a.end(), [&](const Chosen& c) { return std::find(b.begin(), b.end(), c) != b.end(); });
+  return a.size() == b.size() &&
+         std::all_of(a.begin(), a.end(), [&](const Chosen& c) { return std::find(b.begin(), b.end(), c) != b.end(); });
 }
 
 /// Two causes that claim the same slot of the model cannot both be applied.
@@ -81,12 +83,18 @@ void refine_core_noise(Problem& problem, const Fit& best) {
 
 const char* word(Verdict v) {
   switch (v) {
-    case Verdict::adequate: return "adequate";
-    case Verdict::explained: return "explained";
-    case Verdict::partly_explained: return "partly_explained";
-    case Verdict::ambiguous: return "ambiguous";
-    case Verdict::unknown_cause: return "unknown_cause";
-    case Verdict::insufficient: return "insufficient";
+    case Verdict::adequate:
+      return "adequate";
+    case Verdict::explained:
+      return "explained";
+    case Verdict::partly_explained:
+      return "partly_explained";
+    case Verdict::ambiguous:
+      return "ambiguous";
+    case Verdict::unknown_cause:
+      return "unknown_cause";
+    case Verdict::insufficient:
+      return "insufficient";
   }
   return "insufficient";
 }
@@ -115,11 +123,13 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     }
   }
   out.chosen = out.base;
-  out.steps.push_back(fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
+  out.steps.push_back(
+      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
   if (out.singles.empty() || !(out.singles.front().gain > margins.detect)) {
     const bool fine = out.base.ratio < margins.adequate_ratio;
     out.verdict = fine ? Verdict::adequate : Verdict::unknown_cause;
-    out.steps.push_back(fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).", margins.detect,
+    out.steps.push_back(fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
+                                    margins.detect,
                                     out.singles.empty() ? "none" : listed(out.singles.front().fit.chosen),
                                     out.singles.empty() ? 0.0 : out.singles.front().gain));
     return out;
@@ -134,19 +144,32 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
         if (!compatible(level[b].fit.chosen, more)) continue;
         auto set = level[b].fit.chosen;
         set.push_back(more);
-        if (std::any_of(next.begin(), next.end(), [&](const Candidate& c) { return same_set(c.fit.chosen, set); })) continue;
+        if (std::any_of(next.begin(), next.end(), [&](const Candidate& c) { return same_set(c.fit.chosen, set); }))
+          continue;
         next.push_back(candidate(out.base, fit(problem, set, &level[b].fit)));
       }
     }
     sort(next);
+    // Re-test: a second cause may only have helped the first out of a poor valley. The smaller set starts again from
+    // where the larger one ended, and the larger one must beat that.
+    for (std::size_t b = 0; b < std::min(beam, level.size()); ++b) {
+      const auto child = std::find_if(next.begin(), next.end(), [&](const Candidate& c) {
+        return std::equal(level[b].fit.chosen.begin(), level[b].fit.chosen.end(), c.fit.chosen.begin());
+      });
+      if (child == next.end() || child->gain - level[b].gain < margins.second) continue;
+      Candidate again = candidate(out.base, fit(problem, level[b].fit.chosen, &child->fit));
+      if (again.gain > level[b].gain) best_level[b] = level[b] = std::move(again);
+    }
+    sort(best_level);
     if (next.empty() || !(next.front().gain - best_level.front().gain > margins.second)) {
       out.steps.push_back(fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.",
                                       next.empty() ? 0.0 : next.front().gain - best_level.front().gain, margins.second,
                                       listed(best_level.front().fit.chosen)));
       break;
     }
-    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(next.front().fit.chosen), next.front().gain,
-                                    next.front().gain - best_level.front().gain, listed(best_level.front().fit.chosen)));
+    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(next.front().fit.chosen),
+                                    next.front().gain, next.front().gain - best_level.front().gain,
+                                    listed(best_level.front().fit.chosen)));
     level = best_level = std::move(next);
   }
   out.sets = std::move(best_level);
@@ -166,16 +189,22 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const bool mostly = out.chosen.explained > margins.explained_share;
   if (!adequate && !mostly) {
     out.verdict = Verdict::unknown_cause;
-    out.steps.push_back(fmt::format("With it the residual is still {:.2f} times the noise and {:.0f} % of the misfit are explained: none of the known causes "
-                                    "explains this.",
-                                    out.chosen.ratio, 100 * out.chosen.explained));
+    out.steps.push_back(
+        fmt::format("With it the residual is still {:.2f} times the noise and {:.0f} % of the misfit are explained: "
+                    "none of the known causes "
+                    "explains this.",
+                    out.chosen.ratio, 100 * out.chosen.explained));
   } else if (out.tied.size() > 1) {
     out.verdict = Verdict::ambiguous;
-    out.steps.push_back(fmt::format("{} other sets of causes come within {:.0f}: they cannot be told apart with this data.", out.tied.size() - 1, margins.tie));
+    out.steps.push_back(
+        fmt::format("{} other sets of causes come within {:.0f}: they cannot be told apart with this data.",
+                    out.tied.size() - 1, margins.tie));
   } else {
     out.verdict = adequate ? Verdict::explained : Verdict::partly_explained;
-    out.steps.push_back(fmt::format("No other set comes within {:.0f}; the residual is {:.2f} times the noise, {:.0f} % of the misfit are explained.", margins.tie,
-                                    out.chosen.ratio, 100 * out.chosen.explained));
+    out.steps.push_back(
+        fmt::format("No other set comes within {:.0f}; the residual is {:.2f} times the noise, {:.0f} % of the misfit "
+                    "are explained.",
+                    margins.tie, out.chosen.ratio, 100 * out.chosen.explained));
   }
   return out;
 }

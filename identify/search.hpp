@@ -18,8 +18,8 @@ struct Margins {
 
 struct Candidate {
   Fit fit;
-  double gain = 0;     // BIC of the baseline minus its own
-  double ratio = 0;    // rms of whitened residuals, both channels
+  double gain = 0;       // BIC of the baseline minus its own
+  double ratio = 0;      // rms of whitened residuals, both channels
   double explained = 0;  // share of the baseline's excess misfit that it takes away
   bool chosen = false, tied = false;
 };
@@ -29,12 +29,12 @@ const char* word(Verdict verdict);
 
 struct Search {
   Candidate base;
-  std::vector<Candidate> singles;        // best first, one per cause (per log for causes that pick one)
-  std::vector<Candidate> sets;           // sets of the size that was chosen, best first
-  Candidate chosen;                      // what is believed best, whatever the verdict
+  std::vector<Candidate> singles;              // best first, one per cause (per log for causes that pick one)
+  std::vector<Candidate> sets;                 // sets of the size that was chosen, best first
+  Candidate chosen;                            // what is believed best, whatever the verdict
   std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good as the best, itself first
   Verdict verdict = Verdict::insufficient;
-  std::vector<std::string> steps;        // the reasoning in plain words
+  std::vector<std::string> steps;  // the reasoning in plain words
 };
 
 std::vector<std::string> ids_of(const std::vector<Chosen>& chosen);

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Logs with an effect hidden in them, made by host-sim's stove (its own nodes, equations and integrator; nothing of
+// thermal/ or identify/) on raw samples at 10 Hz, with thermistor noise, slow wander, steps, and 1 % current noise.
+// Effect, size, sign, time, motor, duty and seed come from one number that the program never sees.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host-sim/plant/stove.hpp"
+#include "wire/motor.hpp"
+
+namespace tests {
+
+enum class Duty { robot, designed };
+enum class Core { none, sparse, dense };
+
+struct HiddenLogOptions {
+  Duty duty = Duty::robot;
+  Core core = Core::sparse;
+  std::uint64_t seed = 1;
+  std::vector<std::string>
+      effects;  // cause ids; "latent", "gusts", "contact", "grease", "thermostat", "curing", "overload" are outside
+  double strength = 1;  // of the size drawn (1..10 K)
+  double structure =
+      0.1;  // teeth, yoke, frame as share of host-sim's defaults: how far the clean motor is from two nodes
+  double seconds = 1200;
+  bool small_ones = false;  // eleven small effects besides
+};
+
+struct HiddenLog {
+  std::string csv;    // path
+  wire::Motor sheet;  // what the program is told
+  wire::Motor truth;
+  std::string motor;
+  double core_error_K = 0;        // rms of the winding with the effect against without it
+  std::vector<double> core_degC;  // truth at each row
+};
+
+/// All ids that can be hidden (of the catalogue), and those outside of it.
+std::vector<std::string> hideable();
+std::vector<std::string> outside();
+
+HiddenLog make_hidden_log(const HiddenLogOptions& options, const std::string& path);
+
+}  // namespace tests
