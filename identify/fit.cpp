@@ -170,23 +170,26 @@ bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const E
     Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
     double housing_slow[N + 1] = {}, core_slow[N + 1] = {};
     bool finite = true;
-    replay(model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
-      const Bin& bin = log.bins[k];
-      if (bin.housing_n > 0) {
-        finite = finite && std::abs(y2.v) < 1e5;
-        add<N>(sums, housing, housing_slow, y2, bin.housing_degC, static_cast<double>(bin.housing_n));
-      }
-      if (bin.core_n > 0) {
-        finite = finite && std::abs(y1.v) < 1e5;
-        add<N>(sums, core, core_slow, y1, bin.core_degC, static_cast<double>(bin.core_n));
-      }
-      housing.step();
-      core.step();
-      for (int i = 0; i <= N; ++i) housing_slow[i] *= housing.keep;
-      if (core.slow2 > 0) {
-        for (int i = 0; i <= N; ++i) core_slow[i] *= core.keep;
-      }
-    });
+    // A further node brings two coordinates.
+    constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
+    replay<most_nodes>(
+        model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
+          const Bin& bin = log.bins[k];
+          if (bin.housing_n > 0) {
+            finite = finite && std::abs(y2.v) < 1e5;
+            add<N>(sums, housing, housing_slow, y2, bin.housing_degC, static_cast<double>(bin.housing_n));
+          }
+          if (bin.core_n > 0) {
+            finite = finite && std::abs(y1.v) < 1e5;
+            add<N>(sums, core, core_slow, y1, bin.core_degC, static_cast<double>(bin.core_n));
+          }
+          housing.step();
+          core.step();
+          for (int i = 0; i <= N; ++i) housing_slow[i] *= housing.keep;
+          if (core.slow2 > 0) {
+            for (int i = 0; i <= N; ++i) core_slow[i] *= core.keep;
+          }
+        });
     if (!finite || !std::isfinite(sums.misfit)) return false;
     out.misfit += sums.misfit;
     out.readings += sums.readings;
@@ -399,7 +402,7 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
   Replayed out;
   Whitener white(problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.slow_s, log.width_s);
   double slow = 0;
-  replay(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
+  replay<4>(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
     const Bin& bin = log.bins[k];
     out.housing_degC.push_back(y2);
     out.core_degC.push_back(y1);

@@ -139,17 +139,15 @@ template <class S, int n, class Visit>
 
 }  // namespace replay_detail
 
+/// `most_nodes`: what the model may have at most, so that no more is compiled than can happen.
 /// Replays `log` from core and housing temperatures; `visit(bin, housing reading, core reading)`.
-template <class S, class Visit>
+template <int most_nodes, class S, class Visit>
 void replay(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC, Visit&& visit) {
-  switch (model.set.node_count) {
-    case 2:
-      return replay_detail::run<S, 2>(model, log, core_degC, housing_degC, visit);
-    case 3:
-      return replay_detail::run<S, 3>(model, log, core_degC, housing_degC, visit);
-    default:
-      return replay_detail::run<S, 4>(model, log, core_degC, housing_degC, visit);
+  if (model.set.node_count == 2) return replay_detail::run<S, 2>(model, log, core_degC, housing_degC, visit);
+  if constexpr (most_nodes >= 3) {
+    if (model.set.node_count == 3) return replay_detail::run<S, 3>(model, log, core_degC, housing_degC, visit);
   }
+  if constexpr (most_nodes >= 4) return replay_detail::run<S, 4>(model, log, core_degC, housing_degC, visit);
 }
 
 }  // namespace identify
