@@ -1,37 +1,60 @@
 // SPDX-License-Identifier: MIT
+// The walk as a whole: both lanes, modes, faults, against the bench's motor.
 #include "firmware/axis.hpp"
 
 #include <gtest/gtest.h>
 
-#include <memory>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
 
 #include "tests/firmware/bench.hpp"
 
 namespace {
 
 using firmware::Mode;
+using wire::Fault;
+using wire::Limit;
+using wire::Status;
 
-/// A driver whose first axis runs a bench motor.
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+
+/// A driver whose first axis runs a bench motor; the second stays off unless a test uses it.
 struct Rig {
   explicit Rig(const firmware::DriverSetup& setup = bench::driver_setup()) : driver(setup) {}
 
   void run(int periods) {
     for (int i = 0; i < periods; ++i) {
-      duty = axis().tick(motor.sample());
-      motor.run(duty);
-      if (++ticks % 200 == 0) driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+      tick(motor.sample());
+      if (ticks % 200 == 0 && slow_lane_alive)
+        driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{housing_degC, housing_ok}}, {{25.0f, true}}});
     }
   }
+  void tick(const hal::AxisSample& sample) {
+    duty = axis().tick(sample);
+    motor.run(duty);
+    ++ticks;
+  }
+  /// One period with a sample that a test has spoilt.
+  template <class Spoil>
+  void spoilt(Spoil spoil) {
+    hal::AxisSample sample = motor.sample();
+    spoil(sample);
+    tick(sample);
+  }
   void bring_up() {
-    run(2100);
-    ASSERT_EQ(axis().arm(), wire::Status::done);
+    run(2400);
+    ASSERT_EQ(axis().arm(), Status::done);
     run(1);
     ASSERT_EQ(axis().mode(), Mode::ready);
   }
   void hold(wire::Dq current_A, int periods) {
     for (int i = 0; i < periods; i += 100) {
-      ASSERT_EQ(axis().set_current(current_A), wire::Status::done);
-      run(100);
+      ASSERT_EQ(axis().set_current(current_A), Status::done);
+      run(std::min(100, periods - i));
     }
   }
   firmware::Axis& axis() { return driver.axis(0); }
@@ -40,14 +63,23 @@ struct Rig {
   bench::Motor motor;
   hal::Duty duty{};
   int ticks = 0;
+  float housing_degC = 25.0f;
+  bool housing_ok = true, slow_lane_alive = true;
 };
+
+struct Running : testing::Test, Rig {
+  void SetUp() override {
+    bring_up();
+    hold({0.0f, 5.0f}, 1000);
+    ASSERT_EQ(axis().mode(), Mode::running);
+  }
+};
+
+// ---- current --------------------------------------------------------------------------------------------------------
 
 TEST(Axis, ReachesTheAskedCurrentAtStandstillAndAtSpeed) {
   for (const double rad_per_s : {0.0, 300.0, -600.0}) {
     Rig rig;
-    rig.motor.rad_per_s = rad_per_s;
-    rig.run(1);
-    rig.motor.rad_per_s = 0.0;
     rig.bring_up();
     rig.motor.rad_per_s = rad_per_s;
     rig.hold({0.0f, 0.0f}, 2000);
@@ -56,7 +88,7 @@ TEST(Axis, ReachesTheAskedCurrentAtStandstillAndAtSpeed) {
     double id_A = 0.0, iq_A = 0.0;
     constexpr int periods = 2000;
     for (int i = 0; i < periods; ++i) {
-      ASSERT_EQ(rig.axis().set_current({1.0f, 5.0f}), wire::Status::done);
+      ASSERT_EQ(rig.axis().set_current({1.0f, 5.0f}), Status::done);
       rig.run(1);
       id_A += rig.motor.id_A / periods;
       iq_A += rig.motor.iq_A / periods;
@@ -65,6 +97,426 @@ TEST(Axis, ReachesTheAskedCurrentAtStandstillAndAtSpeed) {
     EXPECT_NEAR(iq_A, 5.0, 0.02) << rad_per_s;
     EXPECT_EQ(rig.axis().mode(), Mode::running);
   }
+}
+
+TEST(Axis, AStepRisesAtTheBandwidthAndHardlyOvershoots) {
+  Rig rig;
+  rig.bring_up();
+  rig.hold({0.0f, 0.0f}, 200);
+  ASSERT_EQ(rig.axis().set_current({0.0f, 10.0f}), Status::done);
+  double peak_A = 0.0;
+  int to_63 = -1;
+  for (int i = 0; i < 200; ++i) {
+    rig.run(1);
+    peak_A = std::max(peak_A, rig.motor.iq_A);
+    if (to_63 < 0 && rig.motor.iq_A > 6.32) to_63 = i + 1;
+  }
+  // 1 / (2 pi 1 kHz) = 3.2 periods, and 1.5 of delay; phase margin 63 degrees.
+  EXPECT_GE(to_63, 3);
+  EXPECT_LE(to_63, 6);
+  EXPECT_LT(peak_A, 11.2);
+  EXPECT_NEAR(rig.motor.iq_A, 10.0, 0.1);
+}
+
+double worst_ripple_A(float told_dead_time_s) {
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.rating.dead_time_s = told_dead_time_s;  // the bench's bridge has 500 ns either way
+  Rig rig(setup);
+  rig.bring_up();
+  rig.motor.rad_per_s = 400.0;
+  rig.hold({0.0f, 3.0f}, 2000);
+  double squares = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    EXPECT_EQ(rig.axis().set_current({0.0f, 3.0f}), Status::done);
+    rig.run(1);
+    squares += (std::pow(rig.motor.iq_A - 3.0, 2) + std::pow(rig.motor.id_A, 2)) / 2000;
+  }
+  return std::sqrt(squares);
+}
+
+TEST(Axis, DeadTimeCompensationTakesMostOfTheDistortion) {
+  EXPECT_LT(worst_ripple_A(500e-9f), 0.4 * worst_ripple_A(0.0f));
+}
+
+TEST(Axis, AtTheVoltageLimitItSaysSoAndComesBack) {
+  Rig rig;
+  rig.bring_up();
+  for (int i = 0; i <= 165; ++i) {  // up to a back-EMF of 26.3 V: 1.4 V is left of 48 / sqrt 3, 7 A
+    rig.motor.rad_per_s = 10.0 * i;
+    rig.hold({0.0f, 0.0f}, 100);
+  }
+  rig.hold({0.0f, 15.0f}, 2000);
+  EXPECT_EQ(rig.axis().fast().limit, Limit::voltage);
+  EXPECT_LT(rig.motor.iq_A, 12.0);
+  rig.hold({0.0f, 0.0f}, 40);
+  EXPECT_NEAR(rig.motor.iq_A, 0.0, 0.5) << "wound up";
+  EXPECT_EQ(rig.axis().mode(), Mode::running);
+}
+
+TEST_F(Running, NoSettingOfTheSetpointPassesThePeak) {
+  for (const wire::Dq asked : {wire::Dq{0.0f, 500.0f}, wire::Dq{-700.0f, 700.0f}, wire::Dq{19.0f, 19.0f}}) {
+    hold(asked, 400);
+    const wire::Dq permitted = axis().fast().permitted_A;
+    EXPECT_LE(std::hypot(permitted.d, permitted.q), 20.0001f);
+    EXPECT_LE(std::hypot(motor.id_A, motor.iq_A), 20.3);
+    EXPECT_EQ(axis().fast().limit, Limit::hardware);
+  }
+}
+
+// ---- faults ---------------------------------------------------------------------------------------------------------
+
+TEST_F(Running, EveryTripOpensTheBridgeAtOnceAndKeepsItsEvidence) {
+  spoilt([](auto& s) { s.current_A.b = -28.5f; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  run(2000);
+  const firmware::FaultRecord record = axis().fault();
+  EXPECT_EQ(record.fault, Fault::over_current);
+  EXPECT_EQ(record.axis, 0);
+  EXPECT_FLOAT_EQ(record.value, -28.5f);
+  EXPECT_FLOAT_EQ(record.threshold, 28.0f);
+  EXPECT_NEAR(record.age_s, 0.1f, 1e-4f);
+  EXPECT_EQ(axis().state().fault.fault, Fault::over_current);
+  // A second fault must not paint over the first.
+  spoilt([](auto& s) { s.bus_V = 99.0f; });
+  EXPECT_EQ(axis().fault().fault, Fault::over_current);
+}
+
+TEST_F(Running, NothingMovesAfterAFaultWithoutAClearAndAZeroSetpoint) {
+  spoilt([](auto& s) { s.bus_V = 60.0f; });
+  hold({0.0f, 5.0f}, 400);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  EXPECT_EQ(axis().arm(), Status::tripped);
+  EXPECT_EQ(axis().clear(), Status::setpoint_not_zero);
+  run(10);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+  EXPECT_EQ(axis().clear(), Status::done);
+  // The setpoint moves before the tick obeys: the clear must fall.
+  ASSERT_EQ(axis().set_current({0.0f, 5.0f}), Status::done);
+  run(10);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+  EXPECT_EQ(axis().clear(), Status::done);
+  hold({0.0f, 5.0f}, 1);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+  EXPECT_EQ(axis().clear(), Status::done);
+  run(1);
+  EXPECT_EQ(axis().mode(), Mode::off);
+  EXPECT_EQ(axis().fault().fault, Fault::none);
+  ASSERT_EQ(axis().set_current({0.0f, 5.0f}), Status::done);
+  EXPECT_EQ(axis().arm(), Status::done);
+  run(100);
+  EXPECT_EQ(axis().mode(), Mode::ready) << "a setpoint from before arming must not move it";
+  EXPECT_FALSE(duty.on);
+  hold({0.0f, 5.0f}, 2);
+  EXPECT_EQ(axis().mode(), Mode::running);
+}
+
+TEST_F(Running, OneMissedSampleGoesOnTwoOpenTheBridge) {
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_TRUE(duty.on);
+  run(1);
+  EXPECT_EQ(axis().mode(), Mode::running);
+  spoilt([](auto& s) { s.valid = false; });
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().fault().fault, Fault::invalid_sample);
+}
+
+TEST_F(Running, DisarmOpensTheBridgeAtTheNextTick) {
+  axis().disarm();
+  run(1);
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::off);
+}
+
+TEST(Axis, WhileOffABadSampleOnlyKeepsItFromArming) {
+  Rig rig;
+  rig.motor.bus_V = 5.0;
+  rig.run(3000);
+  EXPECT_EQ(rig.axis().mode(), Mode::off);
+  EXPECT_EQ(rig.axis().arm(), Status::sample_refused);
+  rig.motor.bus_V = 48.0;
+  rig.run(100);
+  EXPECT_EQ(rig.axis().arm(), Status::offset_unknown);
+  rig.run(2000);
+  EXPECT_EQ(rig.axis().arm(), Status::done);
+}
+
+TEST(Axis, NoBitPatternInASampleMakesADutyThatIsNone) {
+  std::mt19937 random(6);
+  Rig rig;
+  rig.bring_up();
+  int tripped = 0, ran = 0;
+#ifdef HOTCORE_TRAP_FLOATS
+  constexpr int rounds = 100'000;
+#else
+  constexpr int rounds = 1'000'000;
+#endif
+  for (int i = 0; i < rounds; ++i) {
+    hal::AxisSample sample = rig.motor.sample();
+    float* fields[] = {&sample.current_A.a, &sample.current_A.b, &sample.current_A.c, &sample.bus_V, &sample.rotor_rad};
+    // Most of the time one field, so that the walk gets past the guard; sometimes all of them.
+    const auto spoil = [&](float& x) {
+      x = random() % 2 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(random()))
+                            : static_cast<float>(random() % 60) - 30.0f;
+    };
+    if (random() % 4 == 0) spoil(*fields[random() % 5]);
+    if (random() % 64 == 0)
+      for (float* field : fields) spoil(*field);
+    if (random() % 64 == 0) sample.sequence = static_cast<std::uint32_t>(random());
+    if (random() % 64 == 0) sample.valid = false;
+    const hal::Duty duty = rig.axis().tick(sample);
+    for (const float ratio : {duty.ratio.a, duty.ratio.b, duty.ratio.c}) {
+      ASSERT_GE(ratio, 0.0f) << i;
+      ASSERT_LE(ratio, 1.0f) << i;
+    }
+    rig.motor.id_A = rig.motor.iq_A = 0.0;
+    if (i % 200 == 0) rig.driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    ran += duty.on;
+    if (rig.axis().mode() == Mode::tripped) {
+      ++tripped;
+      ASSERT_FALSE(duty.on);
+      (void)rig.axis().set_current({0.0f, 0.0f});
+      (void)rig.axis().clear();
+    }
+    if (rig.axis().mode() == Mode::off) (void)rig.axis().arm();
+    (void)rig.axis().set_current(
+        {static_cast<float>(random() % 40) - 20.0f, static_cast<float>(random() % 40) - 20.0f});
+    if (rig.axis().mode() == Mode::tripped) (void)rig.axis().set_current({0.0f, 0.0f});
+  }
+  EXPECT_GT(tripped, rounds / 100);
+  EXPECT_GT(ran, rounds / 20) << "the fuzz must get past the guard to mean anything";
+}
+
+// ---- setpoint time-out ----------------------------------------------------------------------------------------------
+
+TEST_F(Running, SilenceOfTheHostRampsToZeroAndOpensTheBridge) {
+  ASSERT_EQ(axis().set_current({0.0f, 10.0f}), Status::done);
+  int ramp_begins = 0, opens = 0;
+  for (int i = 1; i <= 8000 && opens == 0; ++i) {
+    run(1);
+    if (ramp_begins == 0 && i > 1 && axis().fast().permitted_A.q < 9.999f) ramp_begins = i;
+    if (ramp_begins != 0 && duty.on) {
+      EXPECT_EQ(axis().fast().limit, Limit::setpoint_old);
+    }
+    if (!duty.on) opens = i;
+  }
+  EXPECT_NEAR(ramp_begins * bench::period_s, 0.1, 0.005);
+  EXPECT_NEAR(opens * bench::period_s, 0.3, 0.005);
+  EXPECT_EQ(axis().mode(), Mode::ready);
+  hold({0.0f, 1.0f}, 2);
+  EXPECT_EQ(axis().mode(), Mode::running) << "an armed axis wakes with the next setpoint";
+}
+
+// ---- two axes -------------------------------------------------------------------------------------------------------
+
+std::vector<hal::Duty> first_axis_beside(bool busy_neighbour) {
+  firmware::Driver driver(bench::driver_setup());
+  bench::Motor motors[2];
+  motors[1].angle_rad = 3.0;
+  std::vector<hal::Duty> duties;
+  for (int i = 0; i < 12000; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      firmware::Axis& axis = driver.axis(k);
+      hal::AxisSample sample = motors[k].sample();
+      if (k == 1 && busy_neighbour && i > 9000 && i % 7 == 0) sample.current_A.a = nan;
+      const hal::Duty duty = axis.tick(sample);
+      motors[k].run(duty);
+      if (k == 0) duties.push_back(duty);
+      if (i == 2500 && (k == 0 || busy_neighbour)) {
+        EXPECT_EQ(axis.arm(), Status::done);
+      }
+      if (i > 2500 && i % 50 == 0 && (k == 0 || busy_neighbour)) {
+        EXPECT_EQ(axis.set_current({0.0f, k == 0 ? 2.0f : (i / 500 % 2 == 0 ? -4.0f : 4.0f)}), Status::done);
+      }
+    }
+    if (i % 200 == 199) driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  }
+  EXPECT_EQ(driver.axis(0).mode(), Mode::running);
+  EXPECT_EQ(driver.axis(1).mode(), busy_neighbour ? Mode::tripped : Mode::off);
+  return duties;
+}
+
+TEST(Driver, AnAxisDoesNotFeelTheOtherOneMoveOrTrip) {
+  const std::vector<hal::Duty> alone = first_axis_beside(false), beside = first_axis_beside(true);
+  ASSERT_EQ(alone.size(), beside.size());
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    ASSERT_EQ(alone[i].on, beside[i].on) << i;
+    ASSERT_EQ(alone[i].ratio.a, beside[i].ratio.a) << i;
+    ASSERT_EQ(alone[i].ratio.b, beside[i].ratio.b) << i;
+    ASSERT_EQ(alone[i].ratio.c, beside[i].ratio.c) << i;
+  }
+}
+
+TEST(Driver, TheSharedPowerStageHoldsBothBack) {
+  firmware::Driver driver(bench::driver_setup());
+  bench::Motor motors[2];
+  for (int i = 0; i < 3 * 20000; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      motors[k].run(driver.axis(k).tick(motors[k].sample()));
+      if (i == 2500) {
+        EXPECT_EQ(driver.axis(k).arm(), Status::done);
+      }
+      if (i > 2500 && i % 100 == 0) (void)driver.axis(k).set_current({0.0f, 6.0f});
+    }
+    // The stage's own sensor says that it is at its limit.
+    if (i % 200 == 199) driver.slow_tick({{100.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  }
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(driver.axis(k).state().limit, Limit::board_hot);
+    EXPECT_LT(driver.axis(k).state().allowance_A, 4.5f);  // 6 / sqrt 2 each
+    EXPECT_GT(driver.axis(k).state().allowance_A, 3.9f);
+  }
+}
+
+// ---- heat -----------------------------------------------------------------------------------------------------------
+
+TEST_F(Running, TheSlowLaneGetsTheSquareOfTheCurrent) {
+  hold({0.0f, 5.0f}, 1000);
+  // 25 A2, and the ripple of 48 V on 32.5 uH at 20 kHz, which at standstill is small.
+  EXPECT_NEAR(axis().current2_A2(), 25.0, 0.6);
+}
+
+TEST_F(Running, LostTimeIsChargedHotterThanTheLastSample) {
+  hold({0.0f, 5.0f}, 200 - ticks % 200 + 100);  // the middle of a slow period
+  const double before_A2 = axis().current2_A2();
+  motor.sequence += 60;  // 3 ms without a sample
+  hold({0.0f, 5.0f}, 100);
+  EXPECT_EQ(axis().mode(), Mode::running);
+  // 60 of 260 periods count 1.21 times 25 A2 in every phase, which is twice the vector a real motor could have.
+  EXPECT_GT(axis().current2_A2(), before_A2 * 1.1);
+}
+
+TEST(Axis, AStalledMotorIsHeldByItsCoreLimitBelowIt) {
+  // A winding as small as an EC 16's: 20 A would take it through its limit in half a second.
+  wire::Motor small = bench::motor();
+  small.phase_resistance_ohm = 0.5;
+  small.C1_J_per_K = 1.13;
+  small.R1_K_per_W = 1.08;
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.axes[0] = {firmware::parameters_from(small, bench::rating, {48.0f, 0.0f}), thermal::three_phase_set(small)};
+  Rig rig(setup);
+  rig.motor.sheet = small;
+  rig.bring_up();
+  float hottest_degC = 0.0f, least_A = 20.0f;
+  for (int i = 0; i < 200; ++i) {
+    rig.hold({0.0f, 20.0f}, 200);
+    for (const float degC : rig.axis().state().core_degC) hottest_degC = std::max(hottest_degC, degC);
+    least_A = std::min(least_A, rig.axis().state().allowance_A);
+  }
+  EXPECT_EQ(rig.axis().state().limit, Limit::core_hot);
+  EXPECT_LT(hottest_degC, 155.0f);
+  EXPECT_GT(hottest_degC, 110.0f) << "the governor should use what the winding can stand";
+  EXPECT_NEAR(rig.motor.iq_A, rig.axis().state().allowance_A, 0.2);
+  EXPECT_LT(least_A, 12.0f);
+}
+
+TEST_F(Running, AThermalLaneThatDiesLeavesSixtyPercentOfContinuous) {
+  hold({0.0f, 10.0f}, 400);
+  slow_lane_alive = false;
+  hold({0.0f, 10.0f}, 700);
+  EXPECT_EQ(axis().fast().limit, Limit::thermal_late);
+  EXPECT_NEAR(motor.iq_A, 3.6, 0.1);
+  slow_lane_alive = true;
+  hold({0.0f, 10.0f}, 400);
+  EXPECT_NEAR(motor.iq_A, 10.0, 0.2);
+}
+
+TEST_F(Running, ALostHousingSensorIsGentleAndNamed) {
+  hold({0.0f, 10.0f}, 400);
+  housing_ok = false;
+  float last_A = axis().state().allowance_A;
+  for (int i = 0; i < 100; ++i) {
+    hold({0.0f, 10.0f}, 200);
+    EXPECT_GT(axis().state().allowance_A, last_A - 0.45f) << "no step that would make a robot fall";
+    last_A = axis().state().allowance_A;
+  }
+  EXPECT_FLOAT_EQ(last_A, 3.6f);
+  EXPECT_EQ(axis().state().limit, Limit::blind);
+  EXPECT_NE(axis().state().estimate_flags & thermal::housing_missing, 0u);
+  housing_ok = true;
+  hold({0.0f, 10.0f}, 20000);
+  EXPECT_GT(axis().state().allowance_A, 10.0f);
+}
+
+TEST(Axis, WithoutAHousingSensorByDesignItGoesOnTheModel) {
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.axes[0].senses_housing = false;
+  Rig rig(setup);
+  rig.housing_ok = false;
+  rig.bring_up();
+  rig.hold({0.0f, 10.0f}, 20000);
+  EXPECT_NEAR(rig.motor.iq_A, 10.0, 0.2);
+  EXPECT_NEAR(rig.axis().state().housing_degC, 40.0f, 1.0f);
+}
+
+// ---- offsets --------------------------------------------------------------------------------------------------------
+
+TEST(Axis, LearnsTheCurrentOffsetWhileOff) {
+  Rig rig;
+  for (int i = 0; i < 2100; ++i) rig.spoilt([](auto& s) { s.current_A = {0.3f, -0.2f, 0.1f}; });
+  EXPECT_NEAR(rig.axis().current_offset_A().a, 0.3f, 1e-5f);
+  EXPECT_NEAR(rig.axis().current_offset_A().b, -0.2f, 1e-5f);
+  EXPECT_NEAR(rig.axis().fast().current_A.d, 0.0f, 1e-5f);
+}
+
+TEST(Axis, AnOffsetBeyondItsBoundTrips) {
+  Rig rig;
+  for (int i = 0; i < 2100; ++i) rig.spoilt([](auto& s) { s.current_A.c = -0.6f; });
+  EXPECT_EQ(rig.axis().mode(), Mode::tripped);
+  EXPECT_EQ(rig.axis().fault().fault, Fault::current_offset);
+  EXPECT_NEAR(rig.axis().fault().value, 0.6f, 1e-4f);
+  EXPECT_EQ(rig.axis().current_offset_A().c, 0.0f) << "a broken sensor's offset must not be used";
+}
+
+TEST(Axis, LearnsNothingFromAMotorThatIsDrivenByHand) {
+  Rig rig;
+  rig.motor.rad_per_s = 2000.0;  // 32 V of back-EMF, line to line 55 V: the diodes conduct
+  for (int i = 0; i < 5000; ++i) rig.spoilt([](auto& s) { s.current_A.a = 3.0f; });
+  EXPECT_EQ(rig.axis().current_offset_A().a, 0.0f);
+  EXPECT_EQ(rig.axis().mode(), Mode::off);
+  EXPECT_EQ(rig.axis().arm(), Status::offset_unknown);
+}
+
+// ---- setting up -----------------------------------------------------------------------------------------------------
+
+TEST(Axis, AnIncompleteSetRefusesToArm) {
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.axes[0].parameters.flux_linkage_Wb = wire::unset;
+  Rig rig(setup);
+  rig.run(3000);
+  EXPECT_EQ(rig.axis().mode(), Mode::off);
+  EXPECT_EQ(rig.axis().arm(), Status::parameters_unset);
+  EXPECT_FALSE(rig.duty.on);
+}
+
+TEST(Axis, AContradictorySetTripsAndCannotBeCleared) {
+  const auto check = [](const firmware::DriverSetup& setup, float id) {
+    Rig rig(setup);
+    rig.run(300);
+    EXPECT_EQ(rig.axis().mode(), Mode::tripped);
+    EXPECT_EQ(rig.axis().fault().fault, Fault::parameters);
+    EXPECT_EQ(rig.axis().fault().threshold, id);
+    (void)rig.axis().clear();
+    (void)rig.axis().arm();
+    (void)rig.axis().set_current({0.0f, 1.0f});
+    rig.run(300);
+    EXPECT_EQ(rig.axis().mode(), Mode::tripped);
+    EXPECT_EQ(rig.axis().state().allowance_A, 0.0f);
+    EXPECT_FALSE(rig.duty.on);
+  };
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.axes[0].parameters.current_limit_A = 25.0f;
+  check(setup, 0x0111);
+  setup = bench::driver_setup();
+  setup.axes[0].heat.nodes[0].capacity_J_per_K = -1.0;
+  check(setup, 0.0f);
+  setup = bench::driver_setup();
+  setup.rating.trip_A = 10.0f;  // below the peak
+  check(setup, 0.0f);
 }
 
 }  // namespace

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <string>
+
+#include "firmware/axis_parameters.hpp"
+#include "tests/firmware/bench.hpp"
+
+namespace {
+
+using firmware::AxisParameters;
+using firmware::Finding;
+
+constexpr int count = static_cast<int>(std::size(firmware::axis_dictionary));
+
+/// Where each parameter lives, in the dictionary's order.
+float* fields(AxisParameters& p, int index) {
+  float* all[] = {
+#define PARAM(id, name, unit, fallback, min, max, doc) &p.name##_##unit,
+#include "firmware/axis.params"
+#undef PARAM
+  };
+  return all[index];
+}
+
+TEST(Parameters, ASetFromASheetIsComplete) {
+  const Finding found = validate(bench::parameters(), bench::rating);
+  EXPECT_EQ(found.id, 0) << "value " << found.value;
+}
+
+TEST(Parameters, WhatWasNeverGivenIsNamed) {
+  EXPECT_EQ(validate(AxisParameters{}, bench::rating).id, 0x0101);
+  for (int i = 0; i < count; ++i) {
+    AxisParameters p = bench::parameters();
+    *fields(p, i) = wire::unset;
+    const Finding found = validate(p, bench::rating);
+    EXPECT_EQ(found.id, firmware::axis_dictionary[i].id);
+    EXPECT_TRUE(found.missing);
+  }
+}
+
+TEST(Parameters, WhatIsOutOfRangeIsNamed) {
+  for (int i = 0; i < count; ++i) {
+    const wire::ParameterInfo& info = firmware::axis_dictionary[i];
+    const float step = 0.01f * (info.max - info.min);
+    for (const float bad : {info.min - step, info.max + step, std::numeric_limits<float>::infinity()}) {
+      AxisParameters p = bench::parameters();
+      *fields(p, i) = bad;
+      const Finding found = validate(p, bench::rating);
+      EXPECT_EQ(found.id, info.id) << info.name << " = " << bad;
+      EXPECT_FALSE(found.missing);
+    }
+  }
+}
+
+TEST(Parameters, ContradictionsAreFound) {
+  struct Row {
+    float AxisParameters::*field;
+    float value;
+    int id;
+  };
+  const Row rows[] = {
+      {&AxisParameters::pole_pairs_count, 2.5f, 0x0105},
+      {&AxisParameters::current_limit_A, 20.5f, 0x0111},   // above the board's peak
+      {&AxisParameters::bus_low_end_V, 11.0f, 0x011B},     // below the board's trip: it would never be reached
+      {&AxisParameters::bus_low_start_V, 20.0f, 0x011A},   // below its own end
+      {&AxisParameters::bus_high_start_V, 30.0f, 0x0118},  // below where driving is derated
+      {&AxisParameters::bus_high_end_V, 50.0f, 0x0119},    // below its own start
+      {&AxisParameters::bus_high_end_V, 58.5f, 0x0119},    // above the board's trip
+  };
+  for (const Row& row : rows) {
+    AxisParameters p = bench::parameters();
+    p.*row.field = row.value;
+    EXPECT_EQ(validate(p, bench::rating).id, row.id) << row.value;
+  }
+}
+
+TEST(Parameters, AListThatContradictsItselfDoesNotPass) {
+  using wire::ParameterInfo;
+  using wire::Unit;
+  constexpr ParameterInfo good[] = {{1, "a", Unit::A, 1.0f, 0.0f, 2.0f, ""},
+                                    {2, "b", Unit::A, wire::unset, 0.0f, 2.0f, ""}};
+  constexpr ParameterInfo repeated[] = {{1, "a", Unit::A, 1.0f, 0.0f, 2.0f, ""},
+                                        {1, "b", Unit::A, 1.0f, 0.0f, 2.0f, ""}};
+  constexpr ParameterInfo outside[] = {{1, "a", Unit::A, 3.0f, 0.0f, 2.0f, ""}};
+  constexpr ParameterInfo empty[] = {{1, "a", Unit::A, 1.0f, 2.0f, 0.0f, ""}};
+  static_assert(wire::well_declared(good));
+  static_assert(!wire::well_declared(repeated) && !wire::well_declared(outside) && !wire::well_declared(empty));
+}
+
+TEST(Parameters, TheDictionaryTellsNameUnitAndSense) {
+  for (const wire::ParameterInfo& info : firmware::axis_dictionary) {
+    EXPECT_GT(std::string(info.name).size(), 2u);
+    EXPECT_GT(std::string(wire::text_of(info.unit)).size(), 0u);
+    EXPECT_GT(std::string(info.doc).size(), 10u) << info.name;
+  }
+  EXPECT_STREQ(wire::text_of(wire::Unit::count), "count") << "texts and units stand in the same order";
+}
+
+TEST(Parameters, DeratingFollowsTheSupplyAndStaysInsideTheBoard) {
+  for (const float supply_V : {18.0f, 24.0f, 36.0f, 48.0f, 52.0f}) {
+    const AxisParameters p = firmware::parameters_from(bench::motor(), bench::rating, {supply_V, 0.0f});
+    EXPECT_EQ(validate(p, bench::rating).id, 0) << supply_V;
+    EXPECT_GT(p.bus_high_start_V, supply_V);
+    EXPECT_LT(p.bus_low_start_V, supply_V);
+  }
+}
+
+TEST(Rating, WhatCannotBeMeantIsRefused) {
+  EXPECT_TRUE(plausible(bench::rating));
+  float firmware::BoardRating::*const all[] = {
+      &firmware::BoardRating::pwm_Hz,       &firmware::BoardRating::peak_A,
+      &firmware::BoardRating::continuous_A, &firmware::BoardRating::trip_A,
+      &firmware::BoardRating::bus_min_V,    &firmware::BoardRating::bus_max_V,
+      &firmware::BoardRating::dead_time_s,  &firmware::BoardRating::sampling_window_s};
+  for (const auto field : all) {
+    for (const float bad : {wire::unset, -1.0f, 1e9f, std::numeric_limits<float>::infinity()}) {
+      firmware::BoardRating rating = bench::rating;
+      rating.*field = bad;
+      EXPECT_FALSE(plausible(rating)) << bad;
+    }
+  }
+}
+
+}  // namespace
