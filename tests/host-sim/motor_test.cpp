@@ -225,6 +225,23 @@ TEST(Motor, IronDragTakesItsPowerFromTheShaft) {
   EXPECT_NEAR(motor.work().shaft_J, -expected_J, 1e-9);
 }
 
+TEST(Motor, IronDragFallsWithTheSquareOfTheFlux) {
+  MotorDesign design = small();
+  design.hysteresis_Nm = 1e-3;
+  design.magnet_coefficient_per_K = -0.001;
+  Motor motor(design, period_s);
+  motor.set_magnet_degC(125);
+  motor.load.mode = Load::Mode::imposed_speed;
+  motor.load.speed_rad_per_s = 1000;
+  for (int n = 0; n < 1000; ++n) motor.step(period_s, {0, 0, 0}, 7, false);
+  EXPECT_NEAR(motor.work().iron_J, 0.81 * 1e-3 * 1000 * 1000 * period_s, 1e-9);
+
+  motor.load.mode = Load::Mode::free;  // coasting
+  motor.load.inertia_kg_m2 = 1e-5 - design.rotor_inertia_kg_m2;
+  for (int n = 0; n < 1000; ++n) motor.step(period_s, {0, 0, 0}, 7, false);
+  EXPECT_NEAR(motor.speed_rad_per_s(), 1000 - 0.81 * 1e-3 * 1000 * period_s / 1e-5, 1e-6);
+}
+
 TEST(Motor, AColderMagnetPullsHarder) {
   MotorDesign design = small();
   design.magnet_coefficient_per_K = -0.0011;

@@ -96,6 +96,36 @@ TEST(Encoder, CountsTurnsWrapsAndLatchesTheIndexBothWays) {
   EXPECT_EQ(bench.raw(1).encoder_counts, 0);
 }
 
+TEST(Encoder, LatchesTheSameZeroFromBothSides) {
+  Bench bench(quiet(), 1);
+  const double turn_s = 2 * host_sim::pi / 1000;
+  spin(bench, 1000, 1.5 * turn_s);
+  EXPECT_EQ(bench.raw(0).index_latch, 4096);
+  spin(bench, 1000, 1.0 * turn_s);
+  EXPECT_EQ(bench.raw(0).index_latch, 2 * 4096);
+  spin(bench, -1000, 1.0 * turn_s);
+  EXPECT_EQ(bench.raw(0).index_latch, 2 * 4096);
+  spin(bench, -1000, 1.0 * turn_s);
+  EXPECT_EQ(bench.raw(0).index_latch, 4096);
+}
+
+TEST(BusChain, ReadsVoltsAndTheAmperesThatTheBridgesTake) {
+  const BenchDesign design = quiet();
+  Bench bench(design, 1);
+  bench.load(0).mode = Load::Mode::locked;
+  for (int n = 0; n < 400; ++n) bench.advance_period({hal::Duty{{0.7f, 0.4f, 0.4f}, true}, released[1]});
+  double supply_A = bench.supply_A();
+  ASSERT_GT(supply_A, 3);
+  const host_sim::BoardRaw& raw = bench.board_raw();
+  EXPECT_NEAR((raw.bus_current_counts - design.sensors.bus_zero_counts) * design.sensors.bus_A_per_count, supply_A,
+              0.05);
+  EXPECT_NEAR(raw.bus_voltage_counts * design.sensors.bus_V_per_count, bench.bus_V(), 0.01);
+  // The filter: a millisecond after the current has stopped a third of the reading is left.
+  for (int n = 0; n < 20; ++n) bench.advance_period(released);
+  EXPECT_NEAR((raw.bus_current_counts - design.sensors.bus_zero_counts) * design.sensors.bus_A_per_count / supply_A,
+              std::exp(-1), 0.15);
+}
+
 TEST(Encoder, ThatDoesNotKnowZeroLearnsItAtTheIndex) {
   BenchDesign design = quiet();
   design.encoder_knows_zero = false;
