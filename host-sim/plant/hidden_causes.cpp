@@ -159,6 +159,7 @@ DrawnEffect draw_effect(const HiddenCause& cause, const ThermalDesign& design, c
 
   const auto effect = [&](double amount) {
     ThermalDesign with = design;
+    with.hidden = {};        // sized alone
     Random shape(seed + 1);  // the same shape at every amount
     cause.apply(with.hidden, scale, sign * amount, shape);
     return DrawnEffect{with.hidden, sign * amount, unrefitted_error_K(with, demands, rate_Hz)};
@@ -174,6 +175,9 @@ DrawnEffect draw_effect(const HiddenCause& cause, const ThermalDesign& design, c
     amount = next;
     drawn = effect(amount);
   }
+  drawn.hidden = design.hidden;
+  Random shape(seed + 1);
+  cause.apply(drawn.hidden, scale, drawn.amount, shape);
   return drawn;
 }
 

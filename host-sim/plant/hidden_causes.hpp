@@ -37,7 +37,8 @@ struct DrawnEffect {
                    // housing reading, root mean square
 };
 
-/// Draws one effect whose error is about `target_K` (nearer than 10 %, or the largest amount the cause allows).
+/// Draws one effect whose error alone is about `target_K` (nearer than 10 %, or the largest amount the cause allows)
+/// and adds it to what the design hides already: several at once are drawn one after the other.
 DrawnEffect draw_effect(const HiddenCause& cause, const ThermalDesign& design, const std::vector<Demand>& demands,
                         double rate_Hz, double full_speed_rad_per_s, double target_K, std::uint64_t seed);
 

@@ -232,6 +232,20 @@ TEST(HiddenCauses, IdsAreUniqueAndEffectsAreDrawnToSize) {
   EXPECT_LT(host_sim::unrefitted_error_K(quiet_design(), wanted, rate_Hz), 1e-12);
 }
 
+TEST(HiddenCauses, SecondEffectIsAddedToTheFirstAndSizedAlone) {
+  const auto wanted = demands(Excitation::robot_duty, 5, 300);
+  const auto draw = [&](const char* id, const ThermalDesign& design) {
+    return host_sim::draw_effect(host_sim::hidden_cause(id), design, wanted, rate_Hz, full_speed(), 2, 4);
+  };
+  ThermalDesign design = quiet_design();
+  const auto alone = draw("radiation", design);
+  design.hidden = draw("windage", design).hidden;
+  const auto both = draw("radiation", design);
+  EXPECT_EQ(both.amount, alone.amount);
+  EXPECT_GT(both.hidden.windage_W_s3, 0);
+  EXPECT_EQ(both.hidden.radiation_W_per_K, alone.hidden.radiation_W_per_K);
+}
+
 TEST(HiddenCauses, BothSignsAreDrawnWhereBothExist) {
   const auto wanted = demands(Excitation::robot_duty, 5, 300);
   std::set<bool> signs;
