@@ -12,7 +12,14 @@
 
 namespace h8_15d {
 
-inline constexpr firmware::BoardRating rating = boards::dual_48V_20A;
+/// The shared power stage, but for its sampling window: shunts are sampled in the middle of the zero vector, so half of
+/// the window has to hold dead time, settling and sampling. Two microseconds would leave the amplifier half a
+/// microsecond.
+inline constexpr firmware::BoardRating rating = [] {
+  firmware::BoardRating r = boards::dual_48V_20A;
+  r.sampling_window_s = 3.5e-6f;
+  return r;
+}();
 
 // ---- clocks (RM0090 7.2, Figure 21) ---------------------------------------------------------------------------------
 inline constexpr std::uint32_t hsi_Hz = 16'000'000;  // 7.2.2, until the crystal runs
@@ -136,10 +143,9 @@ static_assert(static_cast<float>(pwm_Hz) == rating.pwm_Hz && reload * 2 * pwm_Hz
 static_assert(full_scale_A > 1.2f * rating.trip_A, "a trip must be seen before the amplifier saturates");
 static_assert(4095.0f * bus_V_per_count > 1.1f * rating.bus_max_V);
 static_assert(static_cast<float>(dead_counts) / static_cast<float>(timer_Hz) == rating.dead_time_s);
-static_assert(rating.sampling_window_s > amplifier_settling_s +
-                                             static_cast<float>(sample_cycles) / static_cast<float>(adc_Hz) +
-                                             rating.dead_time_s,
-              "a shunt must settle and be sampled while its switch is on");
+static_assert(0.5f * rating.sampling_window_s > rating.dead_time_s + amplifier_settling_s +
+                                                    static_cast<float>(sample_cycles) / static_cast<float>(adc_Hz),
+              "a shunt must settle and be sampled before the middle of its window");
 static_assert(2e6f * static_cast<float>(sample_cycles + conversion_cycles) / static_cast<float>(adc_Hz) <
                   0.5e6f / rating.pwm_Hz,
               "two conversions must end before the other axis begins");

@@ -93,21 +93,21 @@ void Adc::advance(Time now) {
   }
 }
 
-void Adc::trigger(unsigned source) {
+void Adc::trigger(unsigned source, Time when) {
   if (!clocked() || !injected_armed() || field(peek(cr2), 16, 4) != source) return;
   if (field(peek(cr2), 20, 2) == 2) return;  // falling edge only: the compare pulse rises here
   patience_ = host_.now() + from_s(1e-3);
   if (injected_end_ != never) return trouble("trigger during an injected conversion", cr2);
-  start_injected();
+  start_injected(when);
 }
 
-void Adc::start_injected() {
+void Adc::start_injected(Time when) {
   const double hz = links_.pclk2_Hz() / links_.common->prescaler();
   if (hz > 36e6) trouble("ADC clock above 36 MHz (ADCPRE)", sr);
   if (injected_count() > 1 && !(peek(cr1) >> 8 & 1)) trouble("injected sequence without SCAN", cr1);
   double cycles = 0;
   for (int i = 0; i < injected_count(); ++i) cycles += sample_cycles(injected_channel(i)) + 12;
-  injected_start_ = host_.now();
+  injected_start_ = when;
   injected_end_ = injected_start_ + static_cast<Time>(cycles * static_cast<double>(clock()));
   at(sr) |= 1u << 3;
   if (regular_end_ != never) {  // 13.3.10: the regular conversion starts again afterwards
@@ -216,7 +216,7 @@ void Adc::on_write(std::uint32_t offset, std::uint32_t value) {
         if (!(value & 1))
           trouble("JSWSTART with ADON = 0", offset);
         else
-          start_injected();
+          start_injected(host_.now());
       }
       host_.reschedule();
       break;

@@ -56,7 +56,7 @@ class Adc : public Device {
   void reset() override;
   Time next_event() const override;
   void advance(Time now) override;
-  void trigger(unsigned source);  // JEXTSEL code of what just rose
+  void trigger(unsigned source, Time when);  // JEXTSEL code of what just rose
   bool irq() const;
   bool injected_armed() const { return (peek(cr2) & 1) && field(peek(cr2), 20, 2) != 0; }
 
@@ -73,7 +73,7 @@ class Adc : public Device {
   int injected_count() const { return static_cast<int>(field(peek(jsqr), 20, 2)) + 1; }
   double sample_cycles(int channel) const;
   Time clock() const;
-  void start_injected();
+  void start_injected(Time when);
   void finish_injected();
   void finish_regular();
   void watch(int channel, bool injected, std::uint32_t counts);

@@ -54,8 +54,8 @@ Chip::Chip()
             [this](Time t) {
               if (board_) board_->period_ended(0, t);
             },
-            [this](bool) {
-              for (int i = 1; i <= 3; ++i) adc(i).trigger(0);
+            [this](Time t) {
+              for (int i = 1; i <= 3; ++i) adc(i).trigger(0, t);
             },                              // JEXTSEL 0000: TIM1_CC4, RM0090 13.13.3
             [this] { tim8.trigger_in(); },  // TIM8 ITR0 = TIM1, RM0090 17.4.3
             24, 25, 27}),
@@ -64,8 +64,8 @@ Chip::Chip()
             [this](Time t) {
               if (board_) board_->period_ended(1, t);
             },
-            [this](bool) {
-              for (int i = 1; i <= 3; ++i) adc(i).trigger(14);
+            [this](Time t) {
+              for (int i = 1; i <= 3; ++i) adc(i).trigger(14, t);
             },  // JEXTSEL 1110: TIM8_CC4
             [] {}, 43, 44, 46}),
       tim3(

@@ -124,7 +124,7 @@ void AdvancedTimer::advance(Time now) {
     if (compare_ == event) {
       compare_ += step * (centre_aligned() ? 2 * top : top + 1);
       at(sr) |= 1u << 4;
-      if (compare4_works() && links_.compare4) links_.compare4(true);
+      if (compare4_works() && links_.compare4) links_.compare4(event);
     } else if (overflow_ == event) {
       last_overflow_ = event;
       down_ = centre_aligned();

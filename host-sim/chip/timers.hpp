@@ -41,9 +41,9 @@ class AdvancedTimer : public Device {
 
   struct Links {
     std::function<double()> clock_Hz;
-    std::function<void(Time)> overflow;         // counter at the top, before the new compare values are loaded
-    std::function<void(bool rising)> compare4;  // OC4REF event towards the ADCs
-    std::function<void()> trgo;                 // towards the other timer
+    std::function<void(Time)> overflow;  // counter at the top, before the new compare values are loaded
+    std::function<void(Time)> compare4;  // towards the ADCs, with the time of the match
+    std::function<void()> trgo;          // towards the other timer
     int irq_break, irq_update, irq_compare;
   };
 

@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-#include "boards/dual_48v_20a.hpp"
+#include "boards/h8-15d/board.hpp"
 #include "boards/host/chip/pcb.hpp"
 #include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
@@ -20,10 +20,10 @@ namespace image_tests {
 inline const std::string image = std::string(HOTCORE_SOURCE_DIR) + "/build/h8-15d/bin/h8-15d.elf";
 inline const std::string order_image = std::string(HOTCORE_SOURCE_DIR) + "/build/h8-15d/bin/nvic-order.elf";
 
-#define NEEDS_IMAGE(path)                                                                                              \
-  if (!std::filesystem::exists(path)) {                                                                                \
-    ASSERT_EQ(std::getenv("HOTCORE_ALL"), nullptr) << path << " is missing";                                           \
-    GTEST_SKIP() << "skipped: no flash image; cmake --preset h8-15d && cmake --build --preset h8-15d";                 \
+#define NEEDS_IMAGE(path)                                                                              \
+  if (!std::filesystem::exists(path)) {                                                                \
+    ASSERT_EQ(std::getenv("HOTCORE_ALL"), nullptr) << path << " is missing";                           \
+    GTEST_SKIP() << "skipped: no flash image; cmake --preset h8-15d && cmake --build --preset h8-15d"; \
   }
 
 struct Options {
@@ -48,7 +48,7 @@ inline host_sim::BenchDesign design_of(const Options& o) {
 inline void setup_of(const Options& o, firmware::AxisSetup (&setup)[2]) {
   const wire::Motor sheet = wire::pc::read_motor(o.motor, std::string(HOTCORE_SOURCE_DIR) + "/boards/motors").motor;
   for (auto& s : setup) {
-    s.parameters = firmware::parameters_from(sheet, boards::dual_48V_20A, {48.0f, 0.0f});
+    s.parameters = firmware::parameters_from(sheet, h8_15d::rating, {48.0f, 0.0f});
     s.heat = thermal::three_phase_set(sheet);
   }
 }

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include "boards/host/chip/play.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <numbers>
+
+#include "boards/h8-15d/board.hpp"
+#include "boards/host/chip/pcb.hpp"
+#include "thermal/motor_set.hpp"
+#include "wire/pc/motor_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace boards {
+namespace {
+
+using host_sim::chip::to_s;
+
+constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;
+constexpr double warm_up_s = 1;  // as host-sim: offsets learnt, housing heard
+constexpr int adc_exception = 16 + 18;
+
+double counts_to_degC(double counts) {
+  const double ohm = 10e3 * counts / (4095 - counts);
+  return 1 / (1 / 298.15 + std::log(ohm / 10e3) / 3950) - 273.15;
+}
+
+}  // namespace
+
+ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const std::string& motor_folder,
+                      const std::function<void(double)>& progress) {
+  using wire::pc::Exit;
+  using wire::pc::UserError;
+  if (!std::filesystem::exists(elf)) {
+    throw UserError(Exit::usage,
+                    elf + " is missing; build it with: cmake --preset h8-15d && cmake --build --preset h8-15d");
+  }
+  if (scene.board != "h8-15d")
+    throw UserError(Exit::usage, "The chip model has the board h8-15d only; use host-sim for " + scene.board + ".");
+  const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, motor_folder);
+
+  host_sim::HeatOptions heat;
+  heat.coolant_R2_K_per_W = scene.coolant_K_per_W;
+  host_sim::BenchDesign design;
+  for (host_sim::AxisDesign& axis : design.axes) axis = host_sim::axis_from_sheet(file.motor, heat);
+  design.sensors = h8_15d_sensors();
+  design.supply.open_V = scene.supply_V;
+  design.supply.can_sink = scene.supply_sinks;
+  design.start_degC = scene.start_degC;
+  design.ambient_degC = scene.ambient_degC;
+  const wire::Motor known = host_sim::true_sheet(file.motor, design.axes[0].heat);
+
+  Pcb pcb(design, scene.seed);
+  pcb.flash_image(elf);
+  firmware::AxisSetup setup[2];
+  for (firmware::AxisSetup& s : setup) {
+    s.parameters = firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f});
+    s.heat = thermal::three_phase_set(known);
+    s.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
+                        : scene.trust == "identified" ? thermal::identified_trust
+                                                      : thermal::exact_trust;
+  }
+  pcb.flash_parameters(setup);
+  for (int axis = 0; axis < 2; ++axis) {
+    host_sim::Load& load = pcb.bench.load(axis);
+    if (scene.shaft.kind == host::Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
+    if (scene.shaft.kind == host::Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
+    load.inertia_kg_m2 = scene.shaft.load_inertia_kg_m2;
+  }
+  const auto started = std::chrono::steady_clock::now();
+  const std::clock_t processor = std::clock();
+  pcb.power_on(scene.seed);
+  pcb.run_for(
+      0.5 * warm_up_s);  // on its index pulse at power-on, so the encoder knows its zero; then somebody turns the shaft
+  for (int axis = 0; axis < 2; ++axis) pcb.bench.motor(axis).place(scene.shaft.angle_rad / file.motor.pole_pairs, 0);
+  pcb.run_for(0.5 * warm_up_s - 0.03);
+  if (!pcb.arm()) {
+    const wire::CodeText text = wire::text_of(static_cast<wire::Status>(pcb.door().answer[0]));
+    throw UserError(Exit::usage, std::string("The image would not arm: ") + text.happened + "; " + text.advice + ".\n" +
+                                     pcb.chip.report_text());
+  }
+
+  const bool two_axes =
+      std::any_of(scene.demands.begin(), scene.demands.end(), [](const host::Demand& d) { return d.axis == 1; });
+  ChipPlay play;
+  play.result = {.scene = scene,
+                 .motor_name = file.name + ", on the chip model",
+                 .surrogate = file.surrogate,
+                 .winding_max_degC = file.motor.winding_max_degC,
+                 .optimal_impulse_As = 0,
+                 .traces = {}};
+  play.result.scene.limiters = {host::Limiter::governor};
+  for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis)
+    play.result.traces.push_back({host::Limiter::governor, axis, {}});
+  pcb.chip.core().clear_counts();
+  const std::uint64_t first_period = pcb.periods();
+  const int log_ms = std::max(1, static_cast<int>(std::lround(1000 / scene.log_Hz)));
+  const int total_ms = static_cast<int>(std::lround(scene.seconds * 1000));
+  double squares[2] = {}, speeds[2] = {}, torques[2] = {}, shafts[2] = {};
+  int summed = 0;
+  std::vector<double> landings = scene.shaft.landings_s;
+  for (int ms = 0; ms < total_ms; ++ms) {
+    const double time_s = ms * 1e-3;
+    for (const host::Trace& t : play.result.traces)
+      pcb.set_current(t.axis, 0.0f, static_cast<float>(host::demand_A(scene, t.axis, time_s)));
+    if (scene.shaft.kind == host::Shaft::Kind::imposed) {
+      const double w =
+          scene.shaft.speed_rad_per_s +
+          scene.shaft.speed_amplitude_rad_per_s * std::sin(2 * std::numbers::pi * scene.shaft.frequency_Hz * time_s);
+      for (int axis = 0; axis < 2; ++axis) pcb.bench.load(axis).speed_rad_per_s = w;
+    }
+    if (!landings.empty() && time_s >= landings.front()) {
+      for (int axis = 0; axis < 2; ++axis) pcb.bench.motor(axis).place(pcb.bench.motor(axis).angle_rad(), 0);
+      landings.erase(landings.begin());
+    }
+    for (int step = 0; step < 4; ++step) {  // truth at 4 kHz
+      pcb.run_for(0.25e-3);
+      ++summed;
+      for (host::Trace& t : play.result.traces) {
+        const host_sim::AxisTruth truth = pcb.bench.truth(t.axis);
+        const double i_A2 = truth.current_d_A * truth.current_d_A + truth.current_q_A * truth.current_q_A;
+        squares[t.axis] += i_A2;
+        speeds[t.axis] += truth.speed_rad_per_s;
+        torques[t.axis] += truth.torque_Nm;
+        shafts[t.axis] += truth.shaft_W;
+        t.hottest_true_degC = std::max(t.hottest_true_degC, truth.hottest_degC);
+        t.peak_shaft_W = std::max(t.peak_shaft_W, truth.shaft_W);
+        if (host::demand_A(scene, t.axis, time_s) != 0) t.impulse_As += std::sqrt(i_A2) * 0.25e-3;
+      }
+    }
+    if ((ms + 1) % log_ms != 0) continue;
+    const h8_15d::Door door = pcb.door();
+    for (host::Trace& t : play.result.traces) {
+      const firmware::AxisState& state = door.axis[t.axis];
+      const host_sim::AxisTruth truth = pcb.bench.truth(t.axis);
+      host::Row row{};
+      row.time_s = time_s + 1e-3;
+      row.demand_A = host::demand_A(scene, t.axis, time_s);
+      row.allowance_A = static_cast<double>(state.allowance_A);
+      row.id_A = truth.current_d_A;
+      row.iq_A = truth.current_q_A;
+      row.current_A = root_3_over_2 * std::sqrt(squares[t.axis] / summed);
+      row.speed_rad_per_s = speeds[t.axis] / summed;
+      row.torque_Nm = torques[t.axis] / summed;
+      row.shaft_W = shafts[t.axis] / summed;
+      row.bus_V = pcb.bench.bus_V();
+      row.bus_A = static_cast<double>(door.bus_A);
+      row.estimated_core_degC =
+          static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
+      row.core_sigma_K = static_cast<double>(state.core_sigma_K);
+      row.true_core_degC = truth.hottest_degC;
+      row.housing_degC = counts_to_degC(pcb.bench.raw(t.axis).housing_counts);
+      row.true_housing_degC = truth.housing_degC;
+      row.ambient_degC = scene.ambient_degC;
+      row.limit = state.limit;
+      row.fault = state.fault.fault;
+      t.rows.push_back(row);
+      squares[t.axis] = speeds[t.axis] = torques[t.axis] = shafts[t.axis] = 0;
+    }
+    summed = 0;
+    if (progress) progress(static_cast<double>(ms + 1) / total_ms);
+  }
+  play.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  play.result.simulated_s = warm_up_s + scene.seconds;
+  play.result.cpu_s = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
+  play.mistakes = pcb.chip.report_text();
+  play.mistake_count = pcb.chip.troubles().count();
+  play.resets = pcb.chip.resets();
+  for (int lane = 0; lane < 2; ++lane) {
+    const host_sim::chip::LaneCount& count = pcb.chip.core().lane(lane == 0 ? adc_exception : 0);
+    play.lane_worst[lane] = static_cast<double>(count.worst);
+    play.lane_mean[lane] =
+        static_cast<double>(count.total) / static_cast<double>(std::max<std::uint64_t>(1, count.calls));
+  }
+  const double scene_s = static_cast<double>(pcb.periods() - first_period) * pcb.bench.period_s();
+  play.asleep_share = to_s(pcb.chip.core().slept()) / std::max(scene_s, 1e-9);
+  return play;
+}
+
+}  // namespace boards
