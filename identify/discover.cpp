@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "identify/model_file.hpp"
 #include "identify/search.hpp"
 
 namespace identify {
@@ -140,7 +141,7 @@ std::string sentence(const Search& found, const Report& r) {
 
 /// Why a log cannot bear a verdict; empty when it can.
 std::string too_poor(const Problem& problem, const Fit& base) {
-  double shortest = 1e300, span = 0;
+  double span = 0;
   for (const Bins& log : problem.logs) {
     if (log.missing_share > 0.35)
       return fmt::format("{}: {:.0f} % of the readings are missing or frozen.", log.name, 100 * log.missing_share);
@@ -152,17 +153,17 @@ std::string too_poor(const Problem& problem, const Fit& base) {
       if (!std::isnan(T)) low = std::min(low, T), high = std::max(high, T);
     }
     span = std::max(span, high - low);
-    shortest = std::min(shortest, log.duration_s());
   }
   if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
+  // A baseline that is wrong may stretch its time constant without end; what the search started from may not.
   const Physical p = physical(problem, base.x);
-  double longest = 0;
-  for (const Bins& log : problem.logs) longest = std::max(longest, log.duration_s());
-  const double housing_s = p.R2_K_per_W * p.C2_J_per_K;
-  if (longest < 0.25 * housing_s) {
+  const double housing_s = std::min(p.R2_K_per_W * p.C2_J_per_K, problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  double all = 0;
+  for (const Bins& log : problem.logs) all += log.duration_s();
+  if (all < 0.25 * housing_s) {
     return fmt::format(
-        "The log lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.",
-        longest, housing_s);
+        "It lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.", all,
+        housing_s);
   }
   return "";
 }
@@ -198,6 +199,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
     report.sentence = sentence(found, report);
   }
   score_held_out(whole, motor, held, base, found.chosen.fit, report);
+  report.model_toml = heat_set_toml(problem, found.chosen.fit, report.sentence);
   return report;
 }
 

@@ -105,8 +105,14 @@ void scales(Problem& problem) {
   problem.speed08_mean = speed08 / n;
 }
 
-/// Without a sheet: several guesses of the time constants, each fitted, the best one kept.
-void rough_search(Problem& problem) {
+/// Without a sheet: several guesses of the time constants, each fitted to the longest log, the best one kept. One log
+/// only, because several may differ in just what is to be found out.
+void rough_search(Problem& whole) {
+  Problem problem = whole;
+  const auto longest = std::max_element(whole.logs.begin(), whole.logs.end(),
+                                        [](const Bins& a, const Bins& b) { return a.duration_s() < b.duration_s(); });
+  problem.logs = {*longest};
+
   double rise_K = 1;
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) {
@@ -137,7 +143,7 @@ void rough_search(Problem& problem) {
       best.C2_J_per_K = p.C2_J_per_K;
     }
   }
-  if (least < 1e300) problem.belief = best;
+  if (least < 1e300) whole.belief = best;
 }
 
 }  // namespace
@@ -190,10 +196,12 @@ bool Problem::possible(const Cause& cause) const {
       return speed08_mean > 0 && (!loaded || amps);
     }
     case Needs::signed_current: {
-      const bool plus = any([](const Bins& b) {
-        return std::any_of(b.bins.begin(), b.bins.end(), [](const Bin& x) { return x.signed_A > 0; });
-      });
-      return amps && plus;
+      // With one sign alone an offset is a change of gain, and cannot be seen.
+      double plus = 0, minus = 0;
+      for (const Bins& log : logs) {
+        for (const Bin& bin : log.bins) (bin.signed_A > 0 ? plus : minus) += bin.signed_A * bin.signed_A;
+      }
+      return amps && std::min(plus, minus) > 0.02 * (plus + minus);
     }
     case Needs::neighbour:
       return any([](const Bins& b) { return b.has_neighbour; });

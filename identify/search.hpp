@@ -12,8 +12,10 @@ namespace identify {
 /// What the decision asks for, in units of BIC; where each comes from stands in search.cpp.
 struct Margins {
   double detect = 10, second = 10, tie = 6;
-  double adequate_ratio = 1.35;   // residual over noise above which a model is not called adequate
-  double explained_share = 0.95;  // of the misfit's excess over noise, for a name in spite of that
+  double adequate_ratio = 1.13;  // residual over noise above which a model is not called adequate
+  double explained_share = 0.8;  // of the misfit's excess over noise, for a name in spite of that
+  double dominance = 3;          // or: evidence of the best single cause over that of the next
+  double noticeable_K = 0.25;    // what a cause must move, rms, in the winding or at the sensor, to be worth a name
 };
 
 struct Candidate {

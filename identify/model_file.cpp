@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "identify/model_file.hpp"
+
+#include <fmt/format.h>
+
+namespace identify {
+namespace {
+
+constexpr const char* drive_names[] = {"one",
+                                       "phase_a_A2",
+                                       "phase_b_A2",
+                                       "phase_c_A2",
+                                       "current_A2",
+                                       "current_A",
+                                       "speed_rad_per_s",
+                                       "speed2_rad2_per_s2",
+                                       "speed3_rad3_per_s3",
+                                       "current2_speed2",
+                                       "current_speed",
+                                       "enabled",
+                                       "power_W",
+                                       "speed_to_0_8"};
+static_assert(std::size(drive_names) == thermal::drive_count);
+constexpr const char* boundary_names[] = {"ambient", "coolant", "frame", "neighbour"};
+static_assert(std::size(boundary_names) == thermal::boundary_count);
+constexpr const char* law_names[] = {"constant", "speed", "natural_convection", "radiation", "temperature"};
+static_assert(std::size(law_names) == static_cast<std::size_t>(thermal::LinkLaw::count));
+
+std::string end_name(int end) {
+  return end < thermal::first_boundary ? fmt::format("{}", end)
+                                       : fmt::format("\"{}\"", boundary_names[end - thermal::first_boundary]);
+}
+
+}  // namespace
+
+std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {
+  const Model<double> m = model_of(problem, f, 0);
+  const auto& set = m.set;
+  std::string s = "# " + sentence + "\n";
+  if (!problem.belief.known && !problem.heated_by_power())
+    s += "# No motor file was given: gains are per assumed ohm; scale heat and capacities together.\n";
+  s += "format = 1\n";
+  for (int i = 0; i < set.node_count; ++i) {
+    const bool winding = i == m.core || i == m.hot_node;
+    s += fmt::format("\n[[node]]  # {}: {}\ncapacity_J_per_K = {:.6g}\n", i,
+                     i == m.core       ? "winding"
+                     : i == m.housing  ? "housing"
+                     : i == m.hot_node ? "hot spot"
+                                       : "further mass",
+                     set.nodes[i].capacity_J_per_K);
+    if (winding) s += fmt::format("max_degC = {:g}\n", problem.belief.winding_max_degC);
+  }
+  for (int i = 0; i < set.link_count; ++i) {
+    const auto& link = set.links[i];
+    s +=
+        fmt::format("\n[[link]]\nfrom = {}\nto = {}\nlaw = \"{}\"\nconductance_W_per_K = {:.6g}\n", end_name(link.from),
+                    end_name(link.to), law_names[static_cast<int>(link.law)], link.conductance_W_per_K);
+    if (link.k != 0) s += fmt::format("k = {:.6g}\n", link.k);
+  }
+  for (int i = 0; i < set.source_count; ++i) {
+    const auto& source = set.sources[i];
+    s += fmt::format("\n[[source]]\nnode = {}\ndrive = \"{}\"\ngain = {:.6g}\n", int{source.node},
+                     drive_names[static_cast<int>(source.drive)], source.gain);
+    if (source.coefficient_per_K != 0) s += fmt::format("coefficient_per_K = {:.6g}\n", source.coefficient_per_K);
+  }
+  s += fmt::format("\n[housing_sensor]\nnode = {}\nlag_s = {:.6g}\noffset_K = {:.6g}\ngain_error = {:.6g}\n",
+                   int{set.housing.node}, set.housing.lag_s, set.housing.offset_K, set.housing.gain_error);
+  std::string recording;
+  if (m.offset) recording += fmt::format("current_offset_A = {:.6g}\n", m.current_offset_A);
+  if (m.delayed) recording += fmt::format("delay_s = {:.6g}\n", m.delay_s);
+  if (m.drifts) recording += fmt::format("ambient_drift_K_per_s = {:.6g}\n", m.drift_K_per_s);
+  if (m.stalls)
+    recording += fmt::format("stall_share = {:.6g}  # the board's three phase nodes hold it already\n", m.stall_share);
+  if (m.cooling_changes)
+    recording += fmt::format("cooling_factor = {:.6g}\ncooling_from_s = {:.6g}\n", m.cooling_factor, m.cooling_from_s);
+  if (!recording.empty()) s += "\n[recording]  # of this log, not of the motor\n" + recording;
+  return s;
+}
+
+}  // namespace identify

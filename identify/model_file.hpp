@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Writes what was found as a heat-network parameter set (TOML): nodes, links and sources as thermal/heat_set.hpp has
+// them, so that the board runs the extended model without new code. What belongs to the recording and not to the motor
+// (clocks, ambient, offsets of the current) stands apart under [recording].
+#pragma once
+
+#include <string>
+
+#include "identify/fit.hpp"
+
+namespace identify {
+
+/// `sentence`: what was found, written as a comment at the top.
+std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence);
+
+}  // namespace identify

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+// Effects hidden by host-sim's stove are found; what is not there is not. A handful of cases of the score
+// (build/host/bin/score prints the whole table), with fixed seeds against regressions.
+#include "identify/search.hpp"
+
+#include <gtest/gtest.h>
+#include <toml++/toml.h>
+
+#include <filesystem>
+
+#include "identify/model_file.hpp"
+#include "identify/table.hpp"
+#include "tests/identify/hidden_log.hpp"
+
+namespace {
+
+using identify::Verdict;
+
+struct Hidden {
+  identify::Problem problem;
+  tests::HiddenLog log;
+};
+
+Hidden hidden(const std::vector<std::string>& effects, std::uint64_t seed, tests::Core core = tests::Core::sparse,
+              double strength = 1) {
+  tests::HiddenLogOptions o;
+  o.duty = tests::Duty::designed;
+  o.core = core;
+  o.seed = seed;
+  o.effects = effects;
+  o.strength = strength;
+  o.structure = 0.3;
+  const std::string path =
+      (std::filesystem::temp_directory_path() /
+       (std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv"))
+          .string();
+  Hidden out{{}, tests::make_hidden_log(o, path)};
+  wire::pc::MotorFile sheet;
+  sheet.motor = out.log.sheet;
+  sheet.name = out.log.motor;
+  out.problem = identify::problem_of(identify::logs_of(identify::read_table(path), {}, out.log.sheet), sheet);
+  return out;
+}
+
+/// A search is hundreds of fits; with sanitizers one of them is enough to look for undefined behaviour.
+#ifdef HOTCORE_TRAP_FLOATS
+constexpr bool slow_build = true;
+#else
+constexpr bool slow_build = false;
+#endif
+
+bool names(const identify::Search& s) {
+  return s.verdict == Verdict::explained || s.verdict == Verdict::partly_explained;
+}
+
+TEST(Search, FindsWhatIsHiddenAndNamesNothingElse) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  int named = 0, wrong = 0;
+  const std::vector<std::string> some = {"load_friction",  "third_mass",     "cooling_change",
+                                         "current_offset", "neighbour_heat", "stall_imbalance"};
+  for (const std::string& id : some) {
+    const auto found = identify::search(hidden({id}, 4242).problem);
+    const bool right = names(found) && found.tied.front() == std::vector<std::string>{id};
+    named += right;
+    wrong += names(found) && !right;
+    if (!right) std::printf("%s: %s\n", id.c_str(), found.steps.back().c_str());
+  }
+  EXPECT_GE(named, 4);
+  EXPECT_LE(wrong, 1);
+}
+
+TEST(Search, WithTheEffectSetToZeroNothingIsNamed) {
+  for (std::uint64_t seed = 51; seed < (slow_build ? 52u : 54u); ++seed) {
+    const auto found = identify::search(hidden({"load_friction"}, seed, tests::Core::sparse, 0).problem);
+    EXPECT_EQ(found.verdict, Verdict::adequate) << seed;
+    EXPECT_TRUE(found.tied.empty());
+  }
+}
+
+TEST(Search, WithTheTrueCauseTakenOutOfTheTableItIsNotNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({"neighbour_heat"}, 4242);
+  const auto with = identify::search(log.problem), without = identify::search(log.problem, {}, {"neighbour_heat"});
+  ASSERT_TRUE(names(with));
+  for (const auto& ids : without.tied) EXPECT_EQ(std::count(ids.begin(), ids.end(), "neighbour_heat"), 0);
+  EXPECT_LT(without.chosen.gain, with.chosen.gain);
+}
+
+TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
+  const Hidden log = hidden({"load_friction"}, 4242);
+  const auto f = identify::fit(log.problem, {{identify::cause_named("load_friction"), -1}});
+  const toml::table file = toml::parse(identify::heat_set_toml(log.problem, f, "found"));
+  EXPECT_EQ(file["format"].value_or(0), 1);
+  EXPECT_EQ(file["node"].as_array()->size(), 2u);
+  EXPECT_EQ(file["link"].as_array()->size(), 2u);
+  ASSERT_EQ(file["source"].as_array()->size(), 2u);
+  EXPECT_EQ(file["source"][1]["drive"].value_or(std::string()), "current_speed");
+  const auto& cause = identify::causes()[static_cast<std::size_t>(f.chosen[0].cause)];
+  EXPECT_NEAR(file["source"][1]["gain"].value_or(0.0), identify::parameter_value(log.problem, cause, 0, f.x[4]),
+              1e-4 * std::abs(f.x[4]));
+}
+
+TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
+  for (const char* id :
+       {"speed_loss_linear",  "speed_loss_quadratic", "winding_eddy",   "ac_copper_loss", "load_friction",
+        "copper_coefficient", "bridge_loss",          "constant_heat",  "speed_cooling",  "natural_convection",
+        "radiation",          "cooling_change",       "third_mass",     "hot_spot",       "neighbour_heat",
+        "frame_conduction",   "board_heat",           "current_offset", "sensor_lag",     "sensor_offset",
+        "sensor_gain",        "ambient_drift",        "clock_delay",    "stall_imbalance"}) {
+    EXPECT_GE(identify::cause_named(id), 0) << id;
+  }
+}
+
+}  // namespace
