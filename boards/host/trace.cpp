@@ -29,6 +29,7 @@ constexpr Column columns[] = {
     {"shaft_W", &Row::shaft_W},
     {"bus_V", &Row::bus_V},
     {"bus_A", &Row::bus_A},
+    {"depth_ratio", &Row::depth_ratio},
     {"estimated_core_degC", &Row::estimated_core_degC},
     {"core_sigma_K", &Row::core_sigma_K},
     {"true_core_degC", &Row::true_core_degC},

@@ -20,6 +20,7 @@ struct Row {
   double speed_rad_per_s;
   double torque_Nm, shaft_W;
   double bus_V, bus_A;
+  double depth_ratio;            // modulation depth: peak of the line-to-line voltage over the bus voltage
   double estimated_core_degC;  // hottest phase winding, as the firmware believes
   double core_sigma_K;
   double true_core_degC;  // hottest phase winding of the simulated motor

@@ -7,6 +7,11 @@
 
 #include "boards/host/run_scene.hpp"
 #include "boards/host/scene.hpp"
+#include "host-sim/plant/heat.hpp"
+#include "thermal/core_estimator.hpp"
+#include "thermal/losses.hpp"
+#include "thermal/motor_set.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace {
 
@@ -101,6 +106,25 @@ TEST(ClosedLoop, NotKnowingTheMotorCostsImpulseNotTheMotor) {
   expect_cool_and_unbroken(sheet, "trust=sheet");
   EXPECT_LT(sheet.traces[0].hottest_true_degC, exact.traces[0].hottest_true_degC - 10);
   EXPECT_LT(sheet.traces[0].impulse_As, exact.traces[0].impulse_As);
+}
+
+/// Sensor set B: a driver that reports no phase currents, only what it draws from the bus.
+TEST(ClosedLoop, BusReadingsAloneFollowTheWindingOnTheHotSide) {
+  const Result result = play("get-up", {"log_Hz=100", "seconds=3.5"});
+  const wire::pc::MotorFile file = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  const wire::Motor known = host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor));
+  thermal::CoreEstimator core(thermal::two_resistor_set(known), {.trust = thermal::exact_trust});
+  const auto as_float = [](double x) { return static_cast<float>(x); };
+  const float Ke_Vs = as_float(std::sqrt(3.0) * known.pole_pairs * known.flux_linkage_Wb);
+  for (const Row& row : result.traces[0].rows) {
+    thermal::HeatInput<> input;
+    input[thermal::Drive::power_W] = static_cast<double>(thermal::bus_power_W(
+        as_float(row.depth_ratio), as_float(row.bus_V), as_float(row.bus_A), Ke_Vs, as_float(row.speed_rad_per_s)));
+    const double estimate_degC = core.tick(input, {as_float(row.housing_degC), true}, {as_float(row.ambient_degC), true}).hottest_degC();
+    if (row.time_s < 0.6) continue;  // the first reading of the housing has to be heard
+    EXPECT_GT(estimate_degC, row.true_winding_degC - 5) << "at " << row.time_s << " s";
+    EXPECT_LT(estimate_degC, row.true_winding_degC + 40) << "at " << row.time_s << " s";
+  }
 }
 
 TEST(ClosedLoop, TheSameSeedGivesTheSameLogAndAnotherSeedAnother) {
