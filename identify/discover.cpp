@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "identify/experiment.hpp"
 #include "identify/model_file.hpp"
 #include "identify/search.hpp"
 
@@ -70,6 +71,7 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
 
 void tell(const Problem& problem, const Search& found, Report& report) {
   report.verdict = word(found.verdict);
+  report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
   std::set<std::string> seen;
   for (const Candidate& c : found.singles) {
@@ -196,6 +198,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
     if (extended) add_extended(problem, found.chosen.fit, report, 0);
+    report.experiment = experiment(problem, found);
     report.sentence = sentence(found, report);
   }
   score_held_out(whole, motor, held, base, found.chosen.fit, report);

@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
 #include "wire/pc/files.hpp"
@@ -27,7 +31,7 @@ Examples
 )";
 
 struct Arguments {
-  std::vector<std::string> logs, columns;
+  std::vector<std::string> logs, columns, truths;
   std::string motor, map, hold_out, json, html, write_model;
   bool explain = false;
 };
@@ -55,6 +59,52 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   return out;
 }
 
+/// Ids in a truth file (host-sim record --hide writes them): { "causes": [ { "id": ... } ] }. Opened after the answer.
+std::vector<std::string> truth_in(const std::string& path) {
+  std::ifstream in(path);
+  const auto json = nlohmann::json::parse(in, nullptr, false);
+  if (!json.is_object() || !json.contains("causes") || !json["causes"].is_array()) {
+    throw UserError(Exit::usage, path + ": is no truth file; host-sim record --hide writes one beside each log.");
+  }
+  std::vector<std::string> ids;
+  for (const auto& cause : json["causes"])
+    ids.push_back(cause.is_string() ? cause.get<std::string>() : cause.value("id", std::string("?")));
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+/// Answers each log by itself, then compares with its truth: all five outcomes, one line a log.
+int score(const Arguments& a, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
+  if (a.truths.size() != a.logs.size()) {
+    throw UserError(Exit::usage,
+                    fmt::format("--score: {} truth files for {} logs; give one for each, in the same order.",
+                                a.truths.size(), a.logs.size()));
+  }
+  std::map<std::string, int> outcomes;
+  fmt::print("{:<40} {:<32} {:<18} {}\n", "log", "truth", "verdict", "answer");
+  for (std::size_t i = 0; i < a.logs.size(); ++i) {
+    fmt::print(stderr, "{} of {}\r", i + 1, a.logs.size());
+    const identify::Report report = identify::discover(read(a.logs[i], map, motor), motor);
+    const auto truth = truth_in(a.truths[i]);
+    std::vector<std::string> named;
+    bool tied_with_truth = false;
+    for (const auto& cause : report.causes) named.push_back(cause.id);
+    std::sort(named.begin(), named.end());
+    for (const auto& set : report.tied) tied_with_truth = tied_with_truth || set == truth;
+    const bool clear = report.verdict == "explained" || report.verdict == "partly_explained";
+    const std::string outcome = clear ? (named == truth ? "named right" : "named wrong")
+                                : report.verdict == "ambiguous"
+                                    ? (tied_with_truth ? "tied with the truth" : "tied without it")
+                                : report.verdict == "adequate" ? (truth.empty() ? "rightly silent" : "silent")
+                                                               : "unknown or insufficient";
+    ++outcomes[outcome];
+    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], fmt::format("{}", fmt::join(truth, " + ")), report.verdict,
+               fmt::join(named, " + "), outcome);
+  }
+  for (const auto& [outcome, count] : outcomes) fmt::print("{:>5}  {}\n", count, outcome);
+  return 0;
+}
+
 int answer(Arguments a) {
   std::optional<wire::pc::MotorFile> motor;
   if (!a.motor.empty()) {
@@ -64,6 +114,7 @@ int answer(Arguments a) {
   identify::ColumnMap map;
   if (!a.map.empty()) map = identify::read_map(a.map);
   for (const std::string& column : a.columns) identify::add_column(map, column);
+  if (!a.truths.empty()) return score(a, map, motor);
   const identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
   std::vector<Log> logs;
   for (const std::string& path : a.logs) {
@@ -101,6 +152,7 @@ int main(int argc, char** argv) {
   app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
   app.add_option("--html", a.html, "write a page with pictures");
   app.add_option("--write-model", a.write_model, "write the model found as a heat-network parameter set");
+  app.add_option("--score", a.truths, "truth files, one a log: print how often each answer was right");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning");
   app.footer("Exit codes: 0 an answer was given, 2 usage, 3 the data cannot be used.");
   try {

@@ -78,6 +78,7 @@ std::string as_json(const Report& r) {
                              {"parameters", parameters(c.parameters)},
                              {"rivals", rivals}});
   }
+  out["tied"] = r.tied;
   out["candidates"] = ordered_json::array();
   for (const Rung& rung : r.ladder) {
     out["candidates"].push_back(

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+#include "identify/experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace identify {
+namespace {
+
+using thermal::Drive;
+
+struct Protocol {
+  const char* why;
+  std::vector<ProfileStep> steps;  // current in units of the log's rms, speed in units of its largest
+};
+
+/// Twenty minutes each: what the table's separating experiments ask for.
+const std::vector<Protocol>& protocols() {
+  static const std::vector<Protocol> all = {
+      {"stall hot and cool down fully at rest", {{60, 0, 0}, {420, 1.7, 0}, {360, 0, 0}, {60, 2.2, 0}, {300, 0, 0}}},
+      {"spin without load at three speeds, resting between",
+       {{60, 0, 0}, {240, 0.05, 0.3}, {90, 0, 0}, {240, 0.05, 0.6}, {90, 0, 0}, {300, 0.05, 1}, {180, 0, 0}}},
+      {"load and speed crossed: stalled, unloaded, both",
+       {{60, 0, 0},
+        {180, 1.5, 0},
+        {120, 0, 0},
+        {180, 0.05, 1},
+        {180, 1.4, 1},
+        {120, 0, 0},
+        {180, 1.4, 0.4},
+        {180, 0, 0}}},
+      {"bursts at standstill with rests",
+       {{60, 0, 0}, {30, 2.6, 0}, {120, 0, 0}, {60, 2.2, 0}, {180, 0, 0}, {240, 1.5, 0}, {60, 2.2, 0}, {450, 0, 0}}},
+      {"low and high currents of both signs",
+       {{60, 0, 0},
+        {180, 0.4, 0},
+        {180, -0.4, 0},
+        {150, 1.6, 0},
+        {150, -1.6, 0},
+        {150, 0.8, 0},
+        {150, -0.8, 0},
+        {180, 0, 0}}},
+      {"heat up, cool at rest; heat up, cool turning without load",
+       {{60, 0, 0}, {240, 1.7, 0}, {300, 0, 0}, {240, 1.7, 0}, {300, 0.05, 1}, {60, 0, 0}}},
+      {"a bit of everything",
+       {{60, 0, 0},
+        {120, 1.6, 0},
+        {60, 0, 0},
+        {120, 0.05, 0.95},
+        {90, -1.6, 0},
+        {60, 2.2, 0},
+        {90, 0.05, 0.4},
+        {120, 1.3, 0.9},
+        {60, 0.5, 0},
+        {120, 0, 0},
+        {90, 1.5, -0.5},
+        {30, 2.4, 0},
+        {180, 0, 0}}},
+  };
+  return all;
+}
+
+/// The protocol as bins of two seconds, no readings yet.
+Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, double amps, double top) {
+  const Bins& like = problem.logs.front();
+  Bins out;
+  out.name = "experiment";
+  out.width_s = std::min(2.0, 4 * like.width_s);
+  out.has_speed = like.has_speed;
+  out.has_housing = true;
+  out.has_core = problem.any_core();
+  double sink = 0;
+  for (const Bin& bin : like.bins) sink += bin.input.boundary_degC[0] / static_cast<double>(like.bins.size());
+  double since_core_s = 0;
+  for (const ProfileStep& step : steps) {
+    for (double t = 0; t < step.seconds; t += out.width_s) {
+      const double a = std::abs(step.current_A) * amps, w = std::abs(step.speed_rad_per_s) * top;
+      Bin bin{};
+      auto& in = bin.input;
+      in[Drive::one] = 1;
+      in[Drive::current_A2] = a * a;
+      in[Drive::current_A] = a;
+      in[Drive::speed_rad_per_s] = w;
+      in[Drive::speed2_rad2_per_s2] = w * w;
+      in[Drive::speed3_rad3_per_s3] = w * w * w;
+      in[Drive::current2_speed2] = a * a * w * w;
+      in[Drive::current_speed] = a * w;
+      in[Drive::enabled] = a > 0 || w > 0 ? 1 : 0;
+      in[Drive::speed_to_0_8] = w > 0 ? std::pow(w, 0.8) : 0;
+      for (double& b : in.boundary_degC) b = sink;
+      // A neighbour that runs on its own: warm in the middle third.
+      const double share = static_cast<double>(out.bins.size()) * out.width_s / 1200;
+      if (like.has_neighbour && share > 0.33 && share < 0.66) in[thermal::Boundary::neighbour] = sink + 30;
+      bin.signed_A = step.current_A * amps;
+      bin.stalled_A2 = w < 2 ? a * a : 0;
+      bin.housing_at = bin.core_at = 0.5f;
+      bin.housing_n = static_cast<float>(10 * out.width_s);
+      bin.idle = a == 0 && w == 0;
+      since_core_s += out.width_s;
+      if (out.has_core && since_core_s >= 30) bin.core_n = 1, since_core_s = 0;
+      out.bins.push_back(bin);
+    }
+  }
+  return out;
+}
+
+/// Fills the readings with what `model` says; returns the hottest winding.
+double fill(Problem& trial, const Fit& truth) {
+  Bins& log = trial.logs.front();
+  for (Bin& bin : log.bins) bin.housing_degC = bin.core_degC = 0;
+  Fit at_rest = truth;
+  const double sink = log.bins.front().input.boundary_degC[0];
+  const Eigen::Index shared = base_count + truth.cause_coordinates();
+  at_rest.x.conservativeResize(shared + per_log_count);
+  at_rest.x[shared] = sink;
+  at_rest.x[shared + 1] = 0;
+  const Replayed r = replayed(trial, at_rest, 0);
+  double hottest = -1e300;
+  for (std::size_t k = 0; k < log.bins.size(); ++k) {
+    log.bins[k].housing_degC = r.housing_degC[k];
+    log.bins[k].core_degC = log.bins[k].core_n > 0 ? r.core_degC[k] : std::numeric_limits<double>::quiet_NaN();
+    hottest = std::max(hottest, r.core_degC[k]);
+  }
+  return hottest;
+}
+
+}  // namespace
+
+std::optional<Experiment> experiment(const Problem& problem, const Search& found) {
+  if (found.verdict != Verdict::ambiguous || problem.heated_by_power()) return std::nullopt;
+  std::vector<const Candidate*> tied;
+  for (const Candidate& c : found.sets) {
+    const bool picks_a_log =
+        std::any_of(c.fit.chosen.begin(), c.fit.chosen.end(), [](const Chosen& x) { return x.log >= 0; });
+    if ((c.chosen || c.tied) && !picks_a_log && tied.size() < 3) tied.push_back(&c);
+  }
+  if (tied.size() < 2) return std::nullopt;
+  double top = 0;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) top = std::max(top, bin.input[Drive::speed_rad_per_s]);
+  }
+
+  Experiment best;
+  double best_D = -1;
+  for (const Protocol& protocol : protocols()) {
+    const bool turns = std::any_of(protocol.steps.begin(), protocol.steps.end(),
+                                   [](const ProfileStep& s) { return s.speed_rad_per_s != 0; });
+    if (turns && top <= 0) continue;
+    double least = 1e300, amps = problem.rms_A;
+    for (const Candidate* truth : tied) {
+      Problem trial = problem;
+      // The motor's own limit, with 10 K to spare, under every one of the models: identification must not burn what it
+      // measures.
+      for (int i = 0; i < 12; ++i) {
+        trial.logs = {bins_for(problem, protocol.steps, amps, top)};
+        if (fill(trial, truth->fit) < problem.belief.winding_max_degC - 10) break;
+        amps *= 0.88;
+      }
+      for (const Candidate* rival : tied) {
+        if (rival == truth) continue;
+        const Fit f = fit(trial, rival->fit.chosen);
+        least = std::min(least, 2 * f.misfit);
+      }
+    }
+    if (least > best_D) {
+      best_D = least;
+      best.profile.clear();
+      for (const ProfileStep& s : protocol.steps)
+        best.profile.push_back({s.seconds, s.current_A * amps * std::sqrt(3.0) / 2, s.speed_rad_per_s * top});
+      best.why = protocol.why;
+    }
+  }
+  const char* chance = best_D < 3    ? "hardly a chance to tell them apart"
+                       : best_D < 10 ? "perhaps half a chance"
+                       : best_D < 20 ? "a fair chance"
+                       : best_D < 40 ? "about 90 % chance"
+                                     : "near certainty";
+  best.why = fmt::format("{}: at least {:.0f} expected between them, {}; the winding stays below {:.0f} degC", best.why,
+                         best_D, chance, problem.belief.winding_max_degC - 10);
+  for (const Candidate* c : tied) {
+    for (const std::string& id : ids_of(c->fit.chosen)) {
+      if (std::find(best.separates.begin(), best.separates.end(), id) == best.separates.end())
+        best.separates.push_back(id);
+    }
+  }
+  return best;
+}
+
+}  // namespace identify
