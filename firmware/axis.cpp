@@ -120,7 +120,7 @@ hal::Duty Axis::unseen(Verdict verdict) {
   sees_ = false;
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
-  if (verdict == Verdict::bridged) return last_;
+  if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) return last_;
   if (mode_ == Mode::ready || mode_ == Mode::running) return trip(guard_.found());
   return last_ = released;
 }
@@ -149,13 +149,12 @@ hal::Duty Axis::resting(const hal::AxisSample& sample, Dq current_A, std::uint32
   return last_;
 }
 
+/// Never from tripped: the first fault keeps its evidence.
 hal::Duty Axis::trip(const FaultRecord& found) {
-  if (mode_ != Mode::tripped) {
-    fault_ = found;
-    fault_.axis = index_;
-    tripped_periods_ = 0;
-    change(Event::trip);
-  }
+  fault_ = found;
+  fault_.axis = index_;
+  tripped_periods_ = 0;
+  change(Event::trip);
   return last_ = released;
 }
 

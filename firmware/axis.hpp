@@ -106,6 +106,8 @@ class Axis {
   double current2_A2() const { return input_[thermal::Drive::current_A2]; }
 
  private:
+  friend struct AxisProbe;  // tests damage what no sample can reach
+
   enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }

@@ -68,7 +68,6 @@ class Setpoint {
   static bool within(float x_A) { return x_A >= -largest_setpoint_A && x_A <= largest_setpoint_A; }
 
   void fade(std::uint32_t periods) {
-    age_periods_ = timeout_periods_;  // stays old without ever wrapping
     share_ -= fade_per_period_ * static_cast<float>(periods);
     if (!(share_ > 0.0f)) share_ = 0.0f;
   }

@@ -13,8 +13,45 @@
 
 #include "tests/firmware/bench.hpp"
 
+namespace firmware {
+
+/// Damages what no sample can reach, as a flipped bit would.
+struct AxisProbe {
+  static constexpr int targets = 6;
+  static void damage(Axis& axis, int target, float value) {
+    switch (target) {
+      case 0:
+        axis.allowance_.current_A = value;
+        break;
+      case 1:
+        axis.current_loop_ = CurrentLoop(with(value), bench::rating);
+        break;
+      case 2:
+        axis.rotor_ = Rotor(with(value), bench::rating);
+        break;
+      case 3:
+        axis.usable_ratio_ = value;
+        break;
+      case 4:
+        axis.dead_time_ = DeadTime(value, 20e3f, 0.1f);
+        break;
+      default:
+        axis.last_.ratio.a = value;
+        break;
+    }
+  }
+  static AxisParameters with(float value) {
+    AxisParameters p = bench::parameters();
+    p.phase_resistance_ohm = p.flux_linkage_Wb = p.rotor_bandwidth_Hz = value;
+    return p;
+  }
+};
+
+}  // namespace firmware
+
 namespace {
 
+using firmware::AxisProbe;
 using firmware::Mode;
 using wire::Fault;
 using wire::Limit;
@@ -116,6 +153,46 @@ TEST(Axis, AStepRisesAtTheBandwidthAndHardlyOvershoots) {
   EXPECT_LE(to_63, 6);
   EXPECT_LT(peak_A, 11.2);
   EXPECT_NEAR(rig.motor.iq_A, 10.0, 0.1);
+}
+
+TEST(Axis, TheDutyIsAimedAtTheAngleAtWhichItActs) {
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.rating.dead_time_s = 0.0f;
+  Rig rig(setup);
+  rig.motor.dead_time_s = 0.0;
+  rig.bring_up();
+  for (int i = 0; i <= 120; ++i) {
+    rig.motor.rad_per_s = 10.0 * i;
+    rig.hold({0.0f, 0.0f}, 100);
+  }
+  rig.hold({0.0f, 0.0f}, 2000);
+  double d_V = 0.0, q_V = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    rig.hold({0.0f, 0.0f}, 1);
+    d_V += static_cast<double>(rig.axis().fast().voltage_V.d) / 2000;
+    q_V += static_cast<double>(rig.axis().fast().voltage_V.q) / 2000;
+  }
+  // At no current the voltage is the back-EMF, all of it on q. Aimed 1.5 periods too early, 18 % of it would lie on d.
+  EXPECT_NEAR(q_V, 1200 * 2 * bench::motor().flux_linkage_Wb, 0.1);
+  EXPECT_NEAR(d_V, 0.0, 0.1);
+}
+
+TEST(Axis, ARestartRemembersNoVoltage) {
+  Rig rig;
+  rig.bring_up();
+  rig.hold({0.0f, 15.0f}, 1000);
+  rig.axis().disarm();
+  rig.run(10);
+  ASSERT_EQ(rig.axis().arm(), Status::done);
+  rig.run(1);
+  double worst_A = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(rig.axis().set_current({0.0f, 0.0f}), Status::done);
+    rig.run(1);
+    worst_A = std::max(worst_A, std::abs(rig.motor.iq_A));
+  }
+  EXPECT_EQ(rig.axis().mode(), Mode::running);
+  EXPECT_LT(worst_A, 0.5);
 }
 
 double worst_ripple_A(float told_dead_time_s) {
@@ -223,6 +300,51 @@ TEST_F(Running, OneMissedSampleGoesOnTwoOpenTheBridge) {
   spoilt([](auto& s) { s.valid = false; });
   EXPECT_FALSE(duty.on);
   EXPECT_EQ(axis().fault().fault, Fault::invalid_sample);
+}
+
+TEST_F(Running, WhatAMissedSampleHoldsIsNotLookedAt) {
+  const hal::Duty before = duty;
+  spoilt([](auto& s) {
+    s.valid = false;
+    s.current_A = {nan, 1e38f, -nan};
+    s.rotor_rad = nan;
+  });
+  EXPECT_TRUE(duty.on);
+  EXPECT_EQ(duty.ratio.a, before.ratio.a);
+  EXPECT_EQ(duty.ratio.b, before.ratio.b);
+  run(10);
+  EXPECT_EQ(axis().mode(), Mode::running);
+}
+
+TEST(Axis, AnArmedAxisTripsBeforeItRuns) {
+  Rig rig;
+  rig.bring_up();
+  rig.spoilt([](auto& s) { s.bus_V = 70.0f; });
+  EXPECT_EQ(rig.axis().mode(), Mode::tripped);
+  EXPECT_EQ(rig.axis().fault().fault, Fault::bus_over_voltage);
+}
+
+TEST(Axis, DamagedMemoryNeverMakesADutyThatIsNone) {
+  for (int target = 0; target < AxisProbe::targets; ++target) {
+    for (const float value : {nan, -nan, std::numeric_limits<float>::infinity(), 1e38f, -1e38f}) {
+      Rig rig;
+      rig.bring_up();
+      rig.motor.rad_per_s = 300.0;
+      rig.hold({1.0f, 5.0f}, 1000);
+      AxisProbe::damage(rig.axis(), target, value);
+      for (int i = 0; i < 400; ++i) {
+        (void)rig.axis().set_current({1.0f, 5.0f});
+        if (i == 100) {
+          AxisProbe::damage(rig.axis(), target, value);
+          rig.spoilt([](auto& s) { s.valid = false; });
+        } else {
+          rig.run(1);
+        }
+        for (const float ratio : {rig.duty.ratio.a, rig.duty.ratio.b, rig.duty.ratio.c})
+          ASSERT_TRUE(ratio >= 0.0f && ratio <= 1.0f) << "target " << target << " value " << value << " tick " << i;
+      }
+    }
+  }
 }
 
 TEST_F(Running, DisarmOpensTheBridgeAtTheNextTick) {

@@ -140,6 +140,17 @@ TEST(Guard, PassesOnlyRatios) {
   }
 }
 
+TEST(Bits, ARangeHoldsWhatLiesWithinAndNothingElse) {
+  const firmware::Range range(2.0f, 3.0f);
+  for (const float good : {2.0f, 2.5f, 3.0f}) EXPECT_TRUE(range.holds(good)) << good;
+  for (const float bad : {nan, -nan, inf, -inf, 0.0f, -2.5f, 1.9999999f, 3.0000003f})
+    EXPECT_FALSE(range.holds(bad)) << bad;
+  for (const firmware::Range& none : {firmware::Range(3.0f, 2.0f), firmware::Range(nan, 2.0f),
+                                      firmware::Range(2.0f, nan), firmware::Range(-1.0f, 2.0f), firmware::Range()}) {
+    for (const float x : {0.0f, 1.0f, 2.5f, -0.5f, inf, 1e30f}) EXPECT_FALSE(none.holds(x)) << x;
+  }
+}
+
 TEST(Guard, WithoutARatingNothingIsAdmitted) {
   Guard guard;
   for (std::uint32_t i = 0; i < 10; ++i) EXPECT_NE(guard.admits(bench::quiet_sample(i)).verdict, Verdict::fresh);

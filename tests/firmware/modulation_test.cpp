@@ -81,6 +81,16 @@ TEST(Modulation, SmallVoltagesAreCentred) {
   EXPECT_NEAR(order.low + order.high, 1.0, 1e-6);
 }
 
+TEST(Modulation, PulsesMoveDownNoFurtherThanTheWindowNeeds) {
+  for (double length_V = 26.0; length_V < 27.5; length_V += 0.01) {
+    const Modulated got = modulate(vector_V(length_V, 0.3), bus_V, 1 - window);
+    const Sorted order(got.ratio);
+    const double spread = static_cast<double>(order.high - order.low);
+    const double wanted = std::min((1 + spread) / 2, std::max(1.0 - static_cast<double>(window), spread));
+    ASSERT_NEAR(order.high, wanted, 1e-5) << length_V;
+  }
+}
+
 TEST(Modulation, WhatDoesNotFitIsShortenedInItsOwnDirection) {
   for (double rad = 0.0; rad < 2 * M_PI; rad += 0.01) {
     const Abc asked = vector_V(80.0, rad);
