@@ -123,7 +123,7 @@ Recording record(const RecordOptions& options) {
   host_sim::Random noise(options.seed ^ 0x6f686d6d);
   std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation, file.name,
                                 file.surrogate ? " (surrogate)" : "", options.seed);
-  csv += fmt::format("# current_A: direct current through two terminals that heats alike; core_degC: {}\n",
+  csv += fmt::format("# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n",
                      options.thermocouple ? "thermocouple" : "from winding resistance, +-2 K, every 30 s");
   csv += "time_s,current_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
   double due_s = 0;

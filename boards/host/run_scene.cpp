@@ -13,6 +13,7 @@
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
+#include "thermal/losses.hpp"
 #include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
@@ -63,7 +64,10 @@ class Wish {
 /// Means over one log interval.
 class Sums {
  public:
+  explicit Sums(double inductance_H, float pwm_Hz) : inductance_H_(static_cast<float>(inductance_H)), pwm_Hz_(pwm_Hz) {}
+
   void add(const firmware::FastView& fast, const host_sim::AxisTruth& truth) {
+    square_A2_ += static_cast<double>(thermal::ripple_A2(fast.ratio, fast.bus_V, inductance_H_, pwm_Hz_));
     torque_current_A_ += static_cast<double>(fast.current_A.q);
     square_A2_ += static_cast<double>(fast.current_A.d * fast.current_A.d + fast.current_A.q * fast.current_A.q);
     speed_ += static_cast<double>(fast.rad_per_s);
@@ -79,12 +83,13 @@ class Sums {
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
     row.shaft_W = shaft_W_ / n;
-    *this = {};
+    *this = Sums(static_cast<double>(inductance_H_), pwm_Hz_);
   }
 
  private:
   double torque_current_A_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
   int count_ = 0;
+  float inductance_H_, pwm_Hz_;
 };
 
 host_sim::Load load_of(const Shaft& shaft) {
@@ -256,7 +261,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
 
   std::vector<Trace> traces;
   std::vector<Wish> wishes;
-  std::vector<Sums> sums(2);
+  std::vector<Sums> sums(2, Sums(file_.motor.inductance_d_H, rating_of(scene_.board).pwm_Hz));
   for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis) {
     traces.push_back({limiter_, axis, {}});
     wishes.emplace_back(scene_, limiter_, file_);

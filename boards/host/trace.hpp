@@ -16,7 +16,7 @@ struct Row {
   double demand_A;     // amplitude asked for
   double allowance_A;  // amplitude the firmware allowed
   double id_A, iq_A;   // at the end of the interval
-  double current_A;    // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2), signed like iq
+  double current_A;    // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM ripple that sampling cannot see, signed like iq
   double speed_rad_per_s;
   double torque_Nm, shaft_W;
   double bus_V, bus_A;
