@@ -87,7 +87,8 @@ std::optional<std::uint64_t> seed_of(const std::string& hide) {
   if (hide.empty()) return {};
   const std::string digits = hide.rfind("seed=", 0) == 0 ? hide.substr(5) : "";
   if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) {
-    throw wire::pc::UserError(wire::pc::Exit::usage, fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
+    throw wire::pc::UserError(wire::pc::Exit::usage,
+                              fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
   }
   return std::stoull(digits);
 }
@@ -103,11 +104,11 @@ void record_log(RecordOptions options, const std::string& out, bool json) {
   wire::pc::write_whole(log, recording.log_csv);
   wire::pc::write_whole(truth, recording.truth_json);
   if (json) {
-    fmt::print("{{\"log\": \"{}\", \"truth\": \"{}\", \"hottest_core_degC\": {:.1f}, \"winding_max_degC\": {:g}}}\n", log, truth,
-               recording.hottest_true_degC, recording.winding_max_degC);
+    fmt::print("{{\"log\": \"{}\", \"truth\": \"{}\", \"hottest_core_degC\": {:.1f}, \"winding_max_degC\": {:g}}}\n",
+               log, truth, recording.hottest_true_degC, recording.winding_max_degC);
   } else {
-    fmt::print("Recorded (simulated): {}; the hottest winding was {:.1f} degC of {:g} allowed. What is hidden: {}\n", log,
-               recording.hottest_true_degC, recording.winding_max_degC, truth);
+    fmt::print("Recorded (simulated): {}; the hottest winding was {:.1f} degC of {:g} allowed. What is hidden: {}\n",
+               log, recording.hottest_true_degC, recording.winding_max_degC, truth);
   }
 }
 
@@ -152,9 +153,12 @@ int main(int argc, char** argv) {
   CLI::App* record_command = app.add_subcommand("record", "record a log, with an effect hidden in the motor if wanted");
   record_command->add_option("excitation", recording.excitation, "duty, designed, step, or a scene")->required();
   record_command->add_option("--motor", recording.motor, "a name (see list) or a .toml file")->capture_default_str();
-  record_command->add_option("--minutes", recording.minutes, "length of the log")->capture_default_str()->check(CLI::Range(0.1, 1440.0));
+  record_command->add_option("--minutes", recording.minutes, "length of the log")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1440.0));
   record_command->add_option("--seed", recording.seed, "of excitation and noise")->capture_default_str();
-  record_command->add_option("--hide", hide, "seed=N: hide an effect drawn from seed N, and take the motor off its sheet");
+  record_command->add_option("--hide", hide,
+                             "seed=N: hide an effect drawn from seed N, and take the motor off its sheet");
   record_command->add_flag("--thermocouple", recording.thermocouple, "a winding temperature in every line");
   record_command->add_option("--out", out, "folder for log.csv and truth.json")->capture_default_str();
   record_command->add_flag("--json", json, "what was recorded as JSON on standard output");

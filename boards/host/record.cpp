@@ -43,7 +43,8 @@ std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Sce
   const std::pair<const char*, Excitation> kinds[] = {
       {"duty", Excitation::robot_duty}, {"designed", Excitation::designed}, {"step", Excitation::one_step}};
   for (const auto& [name, kind] : kinds) {
-    if (options.excitation == name) return host_sim::make_excitation(kind, sheet, full_speed, length_s, program_Hz, options.seed);
+    if (options.excitation == name)
+      return host_sim::make_excitation(kind, sheet, full_speed, length_s, program_Hz, options.seed);
   }
   // A scene, again and again.
   std::vector<host_sim::Demand> demands(static_cast<std::size_t>(length_s * program_Hz));
@@ -74,12 +75,16 @@ Truth draw_truth(const RecordOptions& options, const Scene& scene, const wire::M
   design.sheet = truth.motor;
   const double target_K = random.uniform(least_error_K, largest_error_K);
   const host_sim::DrawnEffect drawn =
-      host_sim::draw_effect(cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, scene.supply_V), target_K, random.next());
+      host_sim::draw_effect(cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, scene.supply_V),
+                            target_K, random.next());
   truth.hidden = drawn.hidden;
   truth.json = {{"format", 1},
                 {"causes", {{{"id", cause.id}, {"amount", drawn.amount}, {"error_before_refit_K", drawn.error_K}}}},
-                {"motor", {{"R1_K_per_W", truth.motor.R1_K_per_W}, {"R2_K_per_W", truth.motor.R2_K_per_W},
-                           {"C1_J_per_K", truth.motor.C1_J_per_K}, {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
+                {"motor",
+                 {{"R1_K_per_W", truth.motor.R1_K_per_W},
+                  {"R2_K_per_W", truth.motor.R2_K_per_W},
+                  {"C1_J_per_K", truth.motor.C1_J_per_K},
+                  {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
   return truth;
 }
 
@@ -90,7 +95,9 @@ Recording record(const RecordOptions& options) {
   if (options.excitation != "duty" && options.excitation != "designed" && options.excitation != "step") {
     scene = read_scene(options.excitation, options.scene_folder, {});
     if (scene.shaft.kind == Shaft::Kind::free) {
-      throw wire::pc::UserError(wire::pc::Exit::usage, "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with an imposed speed or a locked rotor.");
+      throw wire::pc::UserError(wire::pc::Exit::usage,
+                                "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene "
+                                "with an imposed speed or a locked rotor.");
     }
   } else {
     scene.motor = options.motor;
@@ -121,17 +128,20 @@ Recording record(const RecordOptions& options) {
   const Trace& trace = result.traces.at(0);
 
   host_sim::Random noise(options.seed ^ 0x6f686d6d);
-  std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation, file.name,
-                                file.surrogate ? " (surrogate)" : "", options.seed);
-  csv += fmt::format("# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n",
-                     options.thermocouple ? "thermocouple" : "from winding resistance, +-2 K, every 30 s");
+  std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation,
+                                file.name, file.surrogate ? " (surrogate)" : "", options.seed);
+  csv += fmt::format(
+      "# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n",
+      options.thermocouple ? "thermocouple" : "from winding resistance, +-2 K, every 30 s");
   csv += "time_s,current_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
   double due_s = 0;
   for (const Row& row : trace.rows) {
-    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, row.current_A, row.speed_rad_per_s,
-                       row.bus_V, row.bus_A, row.housing_degC, row.ambient_degC);
-    if (options.thermocouple) csv += fmt::format("{:.2f}", row.true_winding_degC);
-    else if (row.time_s >= due_s) csv += fmt::format("{:.2f}", row.true_winding_degC + ohmmeter_K * noise.gauss()), due_s += ohmmeter_every_s;
+    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, row.current_A,
+                       row.speed_rad_per_s, row.bus_V, row.bus_A, row.housing_degC, row.ambient_degC);
+    if (options.thermocouple)
+      csv += fmt::format("{:.2f}", row.true_winding_degC);
+    else if (row.time_s >= due_s)
+      csv += fmt::format("{:.2f}", row.true_winding_degC + ohmmeter_K * noise.gauss()), due_s += ohmmeter_every_s;
     csv += '\n';
   }
   return {csv, truth.json.dump(2) + "\n", trace.hottest_true_degC, result.winding_max_degC};

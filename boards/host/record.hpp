@@ -14,9 +14,9 @@ struct RecordOptions {
   std::string excitation = "duty";  // duty, designed or step; or a scene
   std::string motor = "ec-16-40w";
   double minutes = 20;
-  std::uint64_t seed = 1;                     // of excitation and sensor noise
-  std::optional<std::uint64_t> hide = {};     // of the hidden effect and of how far the motor is off its sheet
-  bool thermocouple = false;                  // a winding temperature in every line; otherwise a resistance reading now and then
+  std::uint64_t seed = 1;                  // of excitation and sensor noise
+  std::optional<std::uint64_t> hide = {};  // of the hidden effect and of how far the motor is off its sheet
+  bool thermocouple = false;  // a winding temperature in every line; otherwise a resistance reading now and then
   std::string motor_folder, scene_folder;
   std::function<void(double)> progress = {};
 };

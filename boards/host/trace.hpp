@@ -16,16 +16,17 @@ struct Row {
   double demand_A;     // amplitude asked for
   double allowance_A;  // amplitude the firmware allowed
   double id_A, iq_A;   // at the end of the interval
-  double current_A;    // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM ripple that sampling cannot see, signed like iq
+  double current_A;  // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM
+                     // ripple that sampling cannot see, signed like iq
   double speed_rad_per_s;
   double torque_Nm, shaft_W;
   double bus_V, bus_A;
-  double depth_ratio;            // modulation depth: peak of the line-to-line voltage over the bus voltage
+  double depth_ratio;          // modulation depth: peak of the line-to-line voltage over the bus voltage
   double estimated_core_degC;  // hottest phase winding, as the firmware believes
   double core_sigma_K;
-  double true_core_degC;  // hottest phase winding of the simulated motor
-  double true_winding_degC;     // mean of the three
-  double housing_degC;    // as the sensor reads
+  double true_core_degC;     // hottest phase winding of the simulated motor
+  double true_winding_degC;  // mean of the three
+  double housing_degC;       // as the sensor reads
   double true_housing_degC;
   double ambient_degC;
   wire::Limit limit;

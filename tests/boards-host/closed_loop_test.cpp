@@ -120,7 +120,8 @@ TEST(ClosedLoop, BusReadingsAloneFollowTheWindingOnTheHotSide) {
     thermal::HeatInput<> input;
     input[thermal::Drive::power_W] = static_cast<double>(thermal::bus_power_W(
         as_float(row.depth_ratio), as_float(row.bus_V), as_float(row.bus_A), Ke_Vs, as_float(row.speed_rad_per_s)));
-    const double estimate_degC = core.tick(input, {as_float(row.housing_degC), true}, {as_float(row.ambient_degC), true}).hottest_degC();
+    const double estimate_degC =
+        core.tick(input, {as_float(row.housing_degC), true}, {as_float(row.ambient_degC), true}).hottest_degC();
     if (row.time_s < 0.6) continue;  // the first reading of the housing has to be heard
     EXPECT_GT(estimate_degC, row.true_winding_degC - 5) << "at " << row.time_s << " s";
     EXPECT_LT(estimate_degC, row.true_winding_degC + 40) << "at " << row.time_s << " s";
