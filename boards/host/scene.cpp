@@ -2,7 +2,6 @@
 #include "boards/host/scene.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <numbers>
 
 #include "wire/pc/names.hpp"
+#include "wire/pc/toml_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace boards::host {
@@ -183,18 +183,6 @@ struct Reader {
   }
 };
 
-std::string find_file(const std::string& which, const std::string& folder) {
-  if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
-    if (fs::is_regular_file(which)) return which;
-    refuse(fmt::format("{}: there is no such scene file.", which));
-  }
-  const std::string path = folder + "/" + which + ".toml";
-  if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
-  const std::vector<std::string> known = scene_names(folder);
-  const std::string hint = did_you_mean(which, known);
-  refuse(fmt::format("Unknown scene '{}'{} Scenes: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
-}
-
 /// The program at a time; before it begins, at rest.
 ProgramStep at(const Scene& scene, double time_s) {
   const double place = time_s * scene.program_Hz;
@@ -220,24 +208,11 @@ const char* name_of(Limiter limiter) {
   return "";
 }
 
-std::vector<std::string> scene_names(const std::string& folder) {
-  std::vector<std::string> names;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder, none)) {
-    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
+std::vector<std::string> scene_names(const std::string& folder) { return wire::pc::toml_names(folder); }
 
 Scene read_scene(const std::string& which, const std::string& folder, const std::vector<std::string>& overrides) {
-  const std::string path = find_file(which, folder);
-  toml::table table;
-  try {
-    table = toml::parse_file(path);
-  } catch (const toml::parse_error& error) {
-    refuse(fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line, error.description()));
-  }
+  const std::string path = wire::pc::find_toml("scene", which, folder);
+  const toml::table table = wire::pc::parse_toml(path);
   Reader reader;
   reader.scene.id = fs::path(path).stem().string();
   reader.scene.title = reader.scene.id;

@@ -2,7 +2,6 @@
 #include "wire/pc/motor_file.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <limits>
 
 #include "wire/pc/names.hpp"
+#include "wire/pc/toml_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace wire::pc {
@@ -67,39 +67,13 @@ double number(const toml::table& table, const std::string& path, const char* nam
   return *value;
 }
 
-std::string find_file(const std::string& which, const std::string& folder) {
-  if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
-    if (fs::is_regular_file(which)) return which;
-    refuse(fmt::format("{}: there is no such motor file.", which));
-  }
-  const std::string path = folder + "/" + which + ".toml";
-  if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
-  const std::vector<std::string> known = motor_names(folder);
-  const std::string hint = did_you_mean(which, known);
-  refuse(
-      fmt::format("Unknown motor '{}'{} Known motors: {}.", which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
-}
-
 }  // namespace
 
-std::vector<std::string> motor_names(const std::string& folder) {
-  std::vector<std::string> names;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder, none)) {
-    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
+std::vector<std::string> motor_names(const std::string& folder) { return toml_names(folder); }
 
 MotorFile read_motor(const std::string& which, const std::string& folder) {
-  const std::string path = find_file(which, folder);
-  toml::table table;
-  try {
-    table = toml::parse_file(path);
-  } catch (const toml::parse_error& error) {
-    refuse(fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line, error.description()));
-  }
+  const std::string path = find_toml("motor", which, folder);
+  const toml::table table = parse_toml(path);
 
   std::vector<std::string> known;
   for (const Key& key : keys) known.push_back(key.name);
