@@ -623,6 +623,8 @@ TEST(Axis, AContradictorySetTripsAndCannotBeCleared) {
     EXPECT_EQ(rig.axis().fault().fault, Fault::parameters);
     EXPECT_EQ(rig.axis().fault().threshold, id);
     (void)rig.axis().clear();
+    rig.run(300);
+    EXPECT_EQ(rig.axis().mode(), Mode::tripped);
     (void)rig.axis().arm();
     (void)rig.axis().set_current({0.0f, 1.0f});
     rig.run(300);
