@@ -4,6 +4,7 @@
 #include "tests/chip/image.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace image_tests {
@@ -90,6 +91,31 @@ TEST(Image, TurnsBothRotorsAndFollowsTheIndex) {
   EXPECT_EQ(pcb->door().axis[0].mode, firmware::Mode::running);
   EXPECT_EQ(pcb->door().axis[1].mode, firmware::Mode::running);
   NO_TROUBLE(*pcb);
+}
+
+TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
+  NEEDS_IMAGE(image);
+  for (const double electrical_turns : {0.05, 0.30, 0.47, 0.70, 0.95}) {
+    auto pcb = std::make_unique<Pcb>(design_of({}), 1);
+    pcb->flash_image(image);
+    firmware::AxisSetup setup[2];
+    setup_of({}, setup);
+    pcb->flash_parameters(setup);
+    for (int i = 0; i < 2; ++i) {
+      pcb->bench.load(i).mode = host_sim::Load::Mode::locked;
+      pcb->bench.motor(i).place(
+          electrical_turns * 2 * host_sim::pi / static_cast<double>(setup[i].parameters.pole_pairs_count), 0);
+    }
+    pcb->power_on();
+    ASSERT_TRUE(pcb->arm()) << electrical_turns;
+    hold(*pcb, 4.0f, 4.0f, 0.05);
+    for (int i = 0; i < 2; ++i) {  // a sector is 60 degrees wide: at most 30 off, so most of the current is torque
+      const auto truth = pcb->bench.truth(i);
+      EXPECT_NEAR(std::hypot(truth.current_d_A, truth.current_q_A), 4.0, 0.4) << electrical_turns;
+      EXPECT_GT(truth.current_q_A, 4.0 * 0.866 - 0.4) << electrical_turns;
+    }
+    NO_TROUBLE(*pcb);
+  }
 }
 
 TEST(Image, RefusesToArmWithoutParameters) {
