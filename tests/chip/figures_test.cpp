@@ -121,7 +121,8 @@ TEST(Figures, ReachesTheThermalLimitAndHoldsIt) {
 // Tolerances and why. Same plant, sheet and demands; other noise (the image has been on for longer), current scale 3 %
 // coarser, a sampling window of 3.5 instead of 2 us, setpoints up to 2 ms later, and a slow lane whose 10 ms begin
 // elsewhere.
-//   current that nothing limits, mean of 20 ms: 0.1 A (noise 0.03 A, half a count 0.01 A)
+//   current that nothing limits, mean of 20 ms: 0.2 A (the host's logged current carries the ripple's
+//   heat, up to 0.14 A of 17 A; this one is the motor's own; without it they differ by 0.006 A)
 //   while the governor acts: 0.6 A (it moves 0.4 A in the 10 ms by which the slow lanes may differ)
 //   estimated core: 4 K (it rises 0.3 K a millisecond, and is 10 ms old at worst); true core: 3 K; impulse: 1 %
 TEST(Figures, AgreesWithTheHostBuildOnTheSameScene) {
@@ -155,7 +156,7 @@ TEST(Figures, AgreesWithTheHostBuildOnTheSameScene) {
       "chip against host: current %.3f A (%.3f A while limited), estimated core %.2f K, true core %.2f K, speed %.1f "
       "rad/s of 2900; impulse %.3f and %.3f A s\n",
       worst_A, worst_limited_A, worst_core_K, worst_true_K, worst_speed, a.impulse_As, b.impulse_As);
-  EXPECT_LT(worst_A, 0.1);
+  EXPECT_LT(worst_A, 0.2);
   EXPECT_LT(worst_limited_A, 0.6);
   EXPECT_LT(worst_core_K, 4.0);
   EXPECT_LT(worst_true_K, 3.0);
