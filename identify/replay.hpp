@@ -11,6 +11,13 @@
 #include "identify/model.hpp"
 #include "thermal/network.hpp"
 
+// With sanitizers a flattened replay takes three minutes to compile and gains nothing.
+#ifdef HOTCORE_TRAP_FLOATS
+#define HOTCORE_FLATTEN
+#else
+#define HOTCORE_FLATTEN [[gnu::flatten]]
+#endif
+
 namespace identify {
 
 namespace replay_detail {
@@ -94,8 +101,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
 // Flattened: with every operation of the dual numbers inlined, their short loops become vector instructions and the run
 // takes a sixth of the time (tests/identify/fit_speed.cpp: 57 ms -> 10 ms for ten hours).
 template <class S, int n, class Visit>
-[[gnu::flatten]] void run(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC,
-                          Visit&& visit) {
+HOTCORE_FLATTEN void run(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC,
+                         Visit&& visit) {
   using Vector = typename thermal::HeatNetwork<S, n>::Vector;
   const auto set = with_cooling_change(model);
   const thermal::HeatNetwork<S, n> network(set);
