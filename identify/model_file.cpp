@@ -3,28 +3,12 @@
 
 #include <fmt/format.h>
 
+#include "thermal/heat_names.hpp"
+
 namespace identify {
 namespace {
 
-constexpr const char* drive_names[] = {"one",
-                                       "phase_a_A2",
-                                       "phase_b_A2",
-                                       "phase_c_A2",
-                                       "current_A2",
-                                       "current_A",
-                                       "speed_rad_per_s",
-                                       "speed2_rad2_per_s2",
-                                       "speed3_rad3_per_s3",
-                                       "current2_speed2",
-                                       "current_speed",
-                                       "enabled",
-                                       "power_W",
-                                       "speed_to_0_8"};
-static_assert(std::size(drive_names) == thermal::drive_count);
-constexpr const char* boundary_names[] = {"ambient", "coolant", "frame", "neighbour"};
-static_assert(std::size(boundary_names) == thermal::boundary_count);
-constexpr const char* law_names[] = {"constant", "speed", "natural_convection", "radiation", "temperature"};
-static_assert(std::size(law_names) == static_cast<std::size_t>(thermal::LinkLaw::count));
+using thermal::boundary_names, thermal::drive_names, thermal::law_names;
 
 std::string end_name(int end) {
   return end < thermal::first_boundary ? fmt::format("{}", end)

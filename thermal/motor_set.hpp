@@ -60,4 +60,48 @@ constexpr HeatSet<double> three_phase_set(const wire::Motor& m) {
   return set;
 }
 
+/// A set with one lumped winding (node 0, fed by current_A2) told apart into three phases, as a standing rotor demands:
+/// what identification writes cannot see the phases. Nodes 0..2 become the phases, the others move up by two.
+/// `coupling_W_per_K` between each pair; 0 is the safe side. A set without room for that is returned as it is.
+constexpr HeatSet<double> split_phases(const HeatSet<double>& lumped, double coupling_W_per_K) {
+  HeatSet<double> set{};
+  const auto moved = [](int end) { return static_cast<std::int8_t>(end == 0 || end >= first_boundary ? end : end + 2); };
+  if (lumped.node_count + 2 > max_nodes) return lumped;
+  set.node_count = lumped.node_count + 2;
+  for (int i = 1; i < lumped.node_count; ++i) set.nodes[i + 2] = lumped.nodes[i];
+  for (int k = 0; k < 3; ++k) {
+    set.nodes[k] = {lumped.nodes[0].capacity_J_per_K / 3.0, lumped.nodes[0].max_degC};
+    set.links[set.link_count++] = motor_set::link(k, (k + 1) % 3, coupling_W_per_K);
+  }
+  for (int i = 0; i < lumped.link_count; ++i) {
+    Link<double> link = lumped.links[i];
+    const bool from_winding = link.from == 0, of_winding = from_winding || link.to == 0;
+    const int copies = of_winding ? 3 : 1;
+    if (set.link_count + copies > max_links) return lumped;
+    link.from = moved(link.from);
+    link.to = moved(link.to);
+    link.conductance_W_per_K /= copies;
+    for (int k = 0; k < copies; ++k) {
+      if (of_winding) (from_winding ? link.from : link.to) = static_cast<std::int8_t>(k);
+      set.links[set.link_count++] = link;
+    }
+  }
+  for (int i = 0; i < lumped.source_count; ++i) {
+    Source<double> source = lumped.sources[i];
+    const int copies = source.node == 0 ? 3 : 1;
+    if (set.source_count + copies > max_sources) return lumped;
+    // |i|^2 = 2/3 (ia^2 + ib^2 + ic^2): the heat of each phase follows its own current.
+    const bool copper = source.node == 0 && source.drive == Drive::current_A2;
+    source.gain *= copper ? 2.0 / 3.0 : 1.0 / copies;
+    for (int k = 0; k < copies; ++k) {
+      source.node = copies == 3 ? static_cast<std::int8_t>(k) : moved(lumped.sources[i].node);
+      if (copper) source.drive = static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k);
+      set.sources[set.source_count++] = source;
+    }
+  }
+  set.housing = lumped.housing;
+  set.housing.node = moved(lumped.housing.node);
+  return set;
+}
+
 }  // namespace thermal

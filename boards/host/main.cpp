@@ -35,6 +35,7 @@ constexpr const char* examples =
     "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and "
     "pictures\n"
     "  host-sim record duty --hide seed=7        a 20 min log of a motor that is not what its sheet says\n"
+    "  host-sim run get-up --hide seed=7 --set trust=identified --set model=model.toml   what identify's model gains\n"
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
@@ -57,12 +58,30 @@ class Progress {
   bool shown_ = false;
 };
 
-void run(const std::string& name, const std::vector<std::string>& overrides, const std::string& out, bool json) {
+std::optional<std::uint64_t> seed_of(const std::string& hide) {
+  if (hide.empty()) return {};
+  const std::string digits = hide.rfind("seed=", 0) == 0 ? hide.substr(5) : "";
+  if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) {
+    throw wire::pc::UserError(wire::pc::Exit::usage,
+                              fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
+  }
+  return std::stoull(digits);
+}
+
+void run(const std::string& name, const std::vector<std::string>& overrides, const std::optional<std::uint64_t>& hide,
+         const std::string& out, bool json) {
   const Scene scene = read_scene(name, scene_folder, overrides);
+  RunOptions options{.motor_folder = motor_folder};
+  if (hide) {
+    const HiddenMotor motor = hidden_motor({.motor = scene.motor, .hide = hide, .motor_folder = motor_folder, .scene_folder = scene_folder});
+    options.plant_motor = motor.motor;
+    options.hidden = motor.hidden;
+  }
   Result result;
   {
     Progress progress(scene.id);
-    result = run_scene(scene, {.motor_folder = motor_folder, .progress = [&](double share) { progress(share); }});
+    options.progress = [&](double share) { progress(share); };
+    result = run_scene(scene, options);
   }
   const std::string folder = out + "/" + scene.id;
   for (const Trace& trace : result.traces) {
@@ -81,16 +100,6 @@ void figures(const std::string& out, bool json) {
   const std::vector<std::string> paths = draw_figures(paper, out + "/figures");
   fmt::print("{}",
              json ? figures_json(paper) : figures_text(paper) + fmt::format("Written: {}\n", fmt::join(paths, " ")));
-}
-
-std::optional<std::uint64_t> seed_of(const std::string& hide) {
-  if (hide.empty()) return {};
-  const std::string digits = hide.rfind("seed=", 0) == 0 ? hide.substr(5) : "";
-  if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) {
-    throw wire::pc::UserError(wire::pc::Exit::usage,
-                              fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
-  }
-  return std::stoull(digits);
 }
 
 void record_log(RecordOptions options, const std::string& out, bool json) {
@@ -131,7 +140,7 @@ int main(int argc, char** argv) {
 #endif
   CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples), "host-sim"};
   app.require_subcommand(1);
-  std::string scene, out = "out";
+  std::string scene, hide, out = "out";
   std::vector<std::string> overrides;
   bool json = false;
 
@@ -139,6 +148,7 @@ int main(int argc, char** argv) {
   run_command->add_option("scene", scene, "a name (see list) or a .toml file")->required();
   run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")
       ->take_all();
+  run_command->add_option("--hide", hide, "seed=N: the motor that record --hide seed=N records; the firmware believes its sheet");
   run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str();
   run_command->add_flag("--json", json, "the summary as JSON on standard output");
 
@@ -149,7 +159,6 @@ int main(int argc, char** argv) {
   figures_command->add_flag("--json", json, "the numbers as JSON on standard output");
 
   RecordOptions recording{.motor_folder = motor_folder, .scene_folder = scene_folder};
-  std::string hide;
   CLI::App* record_command = app.add_subcommand("record", "record a log, with an effect hidden in the motor if wanted");
   record_command->add_option("excitation", recording.excitation, "duty, designed, step, or a scene")->required();
   record_command->add_option("--motor", recording.motor, "a name (see list) or a .toml file")->capture_default_str();
@@ -165,7 +174,7 @@ int main(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-    if (*run_command) run(scene, overrides, out, json);
+    if (*run_command) run(scene, overrides, seed_of(hide), out, json);
     if (*list_command) list();
     if (*record_command) {
       recording.hide = seed_of(hide);

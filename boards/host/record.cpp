@@ -31,11 +31,21 @@ bool shows_on_a_bench(const std::string& id) {
   return id != "current_offset" && id != "neighbour_heat" && id != "frame_conduction" && id != "clock_delay";
 }
 
-struct Truth {
-  wire::Motor motor;
-  host_sim::HiddenEffects hidden;
-  nlohmann::ordered_json json;
-};
+/// The scene that is recorded, without its program: a named one, or an empty one for a made excitation.
+Scene scene_of(const RecordOptions& options) {
+  Scene scene;
+  if (options.excitation == "duty" || options.excitation == "designed" || options.excitation == "step") {
+    scene.motor = options.motor;
+    return scene;
+  }
+  scene = read_scene(options.excitation, options.scene_folder, {});
+  if (scene.shaft.kind == Shaft::Kind::free) {
+    throw wire::pc::UserError(wire::pc::Exit::usage,
+                              "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with "
+                              "an imposed speed or a locked rotor.");
+  }
+  return scene;
+}
 
 std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
   const double length_s = options.minutes * 60, full_speed = host_sim::full_speed_rad_per_s(sheet, scene.supply_V);
@@ -56,11 +66,15 @@ std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Sce
   return demands;
 }
 
-Truth draw_truth(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet,
-                 const std::vector<host_sim::Demand>& demands) {
+}  // namespace
+
+HiddenMotor hidden_motor(const RecordOptions& options) {
+  const Scene scene = scene_of(options);
+  const wire::Motor sheet = wire::pc::read_motor(scene.motor, options.motor_folder).motor;
+  const std::vector<host_sim::Demand> demands = demands_of(options, scene, sheet);
   host_sim::Random random(*options.hide);
   const auto factor = [&] { return std::exp(random.uniform(std::log(least_factor), std::log(largest_factor))); };
-  Truth truth{sheet, {}, {}};
+  HiddenMotor truth{sheet, {}, {}};
   truth.motor.R1_K_per_W *= factor();
   truth.motor.R2_K_per_W *= factor();
   truth.motor.C1_J_per_K *= factor();
@@ -78,30 +92,20 @@ Truth draw_truth(const RecordOptions& options, const Scene& scene, const wire::M
       host_sim::draw_effect(cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, scene.supply_V),
                             target_K, random.next());
   truth.hidden = drawn.hidden;
-  truth.json = {{"format", 1},
-                {"causes", {{{"id", cause.id}, {"amount", drawn.amount}, {"error_before_refit_K", drawn.error_K}}}},
-                {"motor",
-                 {{"R1_K_per_W", truth.motor.R1_K_per_W},
-                  {"R2_K_per_W", truth.motor.R2_K_per_W},
-                  {"C1_J_per_K", truth.motor.C1_J_per_K},
-                  {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
+  const nlohmann::ordered_json json = {
+      {"format", 1},
+      {"causes", {{{"id", cause.id}, {"amount", drawn.amount}, {"error_before_refit_K", drawn.error_K}}}},
+      {"motor",
+       {{"R1_K_per_W", truth.motor.R1_K_per_W},
+        {"R2_K_per_W", truth.motor.R2_K_per_W},
+        {"C1_J_per_K", truth.motor.C1_J_per_K},
+        {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
+  truth.truth_json = json.dump(2) + "\n";
   return truth;
 }
 
-}  // namespace
-
 Recording record(const RecordOptions& options) {
-  Scene scene;
-  if (options.excitation != "duty" && options.excitation != "designed" && options.excitation != "step") {
-    scene = read_scene(options.excitation, options.scene_folder, {});
-    if (scene.shaft.kind == Shaft::Kind::free) {
-      throw wire::pc::UserError(wire::pc::Exit::usage,
-                                "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene "
-                                "with an imposed speed or a locked rotor.");
-    }
-  } else {
-    scene.motor = options.motor;
-  }
+  Scene scene = scene_of(options);
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, options.motor_folder);
   const std::vector<host_sim::Demand> demands = demands_of(options, scene, file.motor);
 
@@ -116,13 +120,14 @@ Recording record(const RecordOptions& options) {
   for (const host_sim::Demand& demand : demands) scene.program.push_back({demand.current_A, demand.speed_rad_per_s});
 
   RunOptions run{.motor_folder = options.motor_folder, .progress = options.progress};
-  Truth truth{file.motor, {}, {{"format", 1}, {"causes", nlohmann::json::array()}}};
+  std::string truth_json = "{\n  \"format\": 1,\n  \"causes\": []\n}\n";
   if (options.hide) {
-    truth = draw_truth(options, scene, file.motor, demands);
+    const HiddenMotor truth = hidden_motor(options);
     run.plant_motor = truth.motor;
     run.hidden = truth.hidden;
     run.winding_margin_K = unknown_motor_margin_K;
     scene.trust = "sheet";
+    truth_json = truth.truth_json;
   }
   const Result result = run_scene(scene, run);
   const Trace& trace = result.traces.at(0);
@@ -144,7 +149,7 @@ Recording record(const RecordOptions& options) {
       csv += fmt::format("{:.2f}", row.true_winding_degC + ohmmeter_K * noise.gauss()), due_s += ohmmeter_every_s;
     csv += '\n';
   }
-  return {csv, truth.json.dump(2) + "\n", trace.hottest_true_degC, result.winding_max_degC};
+  return {csv, truth_json, trace.hottest_true_degC, result.winding_max_degC};
 }
 
 }  // namespace boards::host

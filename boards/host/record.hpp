@@ -8,6 +8,9 @@
 #include <optional>
 #include <string>
 
+#include "host-sim/plant/hidden.hpp"
+#include "wire/motor.hpp"
+
 namespace boards::host {
 
 struct RecordOptions {
@@ -26,6 +29,14 @@ struct Recording {
   std::string truth_json;
   double hottest_true_degC, winding_max_degC;
 };
+
+/// The motor that `options.hide` hides: off its sheet, with an effect that is sized on the excitation of these options.
+struct HiddenMotor {
+  wire::Motor motor;
+  host_sim::HiddenEffects hidden;
+  std::string truth_json;
+};
+HiddenMotor hidden_motor(const RecordOptions& options);
 
 Recording record(const RecordOptions& options);
 

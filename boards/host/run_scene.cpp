@@ -10,6 +10,7 @@
 
 #include "boards/dual_48v_80a.hpp"
 #include "boards/host/board.hpp"
+#include "boards/host/heat_file.hpp"
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
@@ -176,11 +177,16 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
                                    const host_sim::BenchDesign& design, const RunOptions& options) {
   wire::Motor known = options.plant_motor ? file.motor : host_sim::true_sheet(file.motor, design.axes[0].heat);
   known.winding_max_degC -= options.winding_margin_K;
-  if (limiter != Limiter::governor) known.winding_max_degC = no_limit_degC;
   const firmware::BoardRating rating = rating_of(scene.board);
   firmware::AxisSetup axis;
   axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
-  axis.heat = thermal::three_phase_set(known);
+  axis.heat = scene.model.empty() ? thermal::three_phase_set(known)
+                                  : thermal::split_phases(read_heat_set(scene.model), known.phase_coupling_W_per_K);
+  if (limiter != Limiter::governor) {
+    for (thermal::Node<double>& node : axis.heat.nodes) {
+      if (std::isfinite(node.max_degC)) node.max_degC = static_cast<float>(no_limit_degC);
+    }
+  }
   axis.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
                          : scene.trust == "identified" ? thermal::identified_trust
                                                        : thermal::exact_trust;
