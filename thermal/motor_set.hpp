@@ -65,7 +65,9 @@ constexpr HeatSet<double> three_phase_set(const wire::Motor& m) {
 /// `coupling_W_per_K` between each pair; 0 is the safe side. A set without room for that is returned as it is.
 constexpr HeatSet<double> split_phases(const HeatSet<double>& lumped, double coupling_W_per_K) {
   HeatSet<double> set{};
-  const auto moved = [](int end) { return static_cast<std::int8_t>(end == 0 || end >= first_boundary ? end : end + 2); };
+  const auto moved = [](int end) {
+    return static_cast<std::int8_t>(end == 0 || end >= first_boundary ? end : end + 2);
+  };
   if (lumped.node_count + 2 > max_nodes) return lumped;
   set.node_count = lumped.node_count + 2;
   for (int i = 1; i < lumped.node_count; ++i) set.nodes[i + 2] = lumped.nodes[i];

@@ -47,7 +47,8 @@ int named(const std::string& place, const toml::table& table, const char* key, c
 
 /// A node number, or the name of a boundary.
 std::int8_t end_of(const std::string& place, const toml::table& table, const char* key) {
-  if (const auto node = table[key].value<int>()) return static_cast<std::int8_t>(std::clamp(*node, -1, thermal::first_boundary - 1));
+  if (const auto node = table[key].value<int>())
+    return static_cast<std::int8_t>(std::clamp(*node, -1, thermal::first_boundary - 1));
   return thermal::boundary_end(static_cast<thermal::Boundary>(named(place, table, key, thermal::boundary_names)));
 }
 
@@ -57,8 +58,10 @@ constexpr double required = std::numeric_limits<double>::quiet_NaN();
 template <class Take>
 int each(const std::string& path, const toml::table& file, const char* name, int most, Take take) {
   const toml::array* list = file[name].as_array();
-  if (list == nullptr) refuse(fmt::format("{}: there is no [[{}]]; let identify --write-model write the file.", path, name));
-  if (static_cast<int>(list->size()) > most) refuse(fmt::format("{}: more than {} [[{}]] do not fit the board.", path, most, name));
+  if (list == nullptr)
+    refuse(fmt::format("{}: there is no [[{}]]; let identify --write-model write the file.", path, name));
+  if (static_cast<int>(list->size()) > most)
+    refuse(fmt::format("{}: more than {} [[{}]] do not fit the board.", path, most, name));
   int count = 0;
   for (const toml::node& node : *list) {
     const std::string place = fmt::format("{}: {} {}", path, name, count);
@@ -76,33 +79,38 @@ thermal::HeatSet<double> read_heat_set(const std::string& path) {
   if (file["format"].value_or(0) != 1) refuse(path + ": format must be 1; write the model again with this identify.");
 
   thermal::HeatSet<double> set{};
-  set.node_count = each(path, file, "node", thermal::max_nodes, [&](const std::string& place, const toml::table& t, int i) {
-    known_keys(place, t, {"capacity_J_per_K", "max_degC"});
-    set.nodes[i] = {number(place, t, "capacity_J_per_K", required),
-                    static_cast<float>(number(place, t, "max_degC", std::numeric_limits<double>::infinity()))};
-  });
-  set.link_count = each(path, file, "link", thermal::max_links, [&](const std::string& place, const toml::table& t, int i) {
-    known_keys(place, t, {"from", "to", "law", "conductance_W_per_K", "k"});
-    set.links[i] = {end_of(place, t, "from"), end_of(place, t, "to"),
-                    static_cast<thermal::LinkLaw>(named(place, t, "law", thermal::law_names)),
-                    number(place, t, "conductance_W_per_K", required), number(place, t, "k", 0)};
-  });
-  set.source_count = each(path, file, "source", thermal::max_sources, [&](const std::string& place, const toml::table& t, int i) {
-    known_keys(place, t, {"node", "drive", "gain", "coefficient_per_K"});
-    set.sources[i] = {static_cast<std::int8_t>(number(place, t, "node", required)),
-                      static_cast<thermal::Drive>(named(place, t, "drive", thermal::drive_names)),
-                      number(place, t, "gain", required), number(place, t, "coefficient_per_K", 0)};
-  });
+  set.node_count =
+      each(path, file, "node", thermal::max_nodes, [&](const std::string& place, const toml::table& t, int i) {
+        known_keys(place, t, {"capacity_J_per_K", "max_degC"});
+        set.nodes[i] = {number(place, t, "capacity_J_per_K", required),
+                        static_cast<float>(number(place, t, "max_degC", std::numeric_limits<double>::infinity()))};
+      });
+  set.link_count =
+      each(path, file, "link", thermal::max_links, [&](const std::string& place, const toml::table& t, int i) {
+        known_keys(place, t, {"from", "to", "law", "conductance_W_per_K", "k"});
+        set.links[i] = {end_of(place, t, "from"), end_of(place, t, "to"),
+                        static_cast<thermal::LinkLaw>(named(place, t, "law", thermal::law_names)),
+                        number(place, t, "conductance_W_per_K", required), number(place, t, "k", 0)};
+      });
+  set.source_count =
+      each(path, file, "source", thermal::max_sources, [&](const std::string& place, const toml::table& t, int i) {
+        known_keys(place, t, {"node", "drive", "gain", "coefficient_per_K"});
+        set.sources[i] = {static_cast<std::int8_t>(number(place, t, "node", required)),
+                          static_cast<thermal::Drive>(named(place, t, "drive", thermal::drive_names)),
+                          number(place, t, "gain", required), number(place, t, "coefficient_per_K", 0)};
+      });
   const toml::table empty;
   const toml::table& sensor = file["housing_sensor"].is_table() ? *file["housing_sensor"].as_table() : empty;
   known_keys(path + ": housing_sensor", sensor, {"node", "lag_s", "offset_K", "gain_error"});
   set.housing = {static_cast<std::int8_t>(number(path + ": housing_sensor", sensor, "node", required)),
-                 number(path, sensor, "lag_s", 0), number(path, sensor, "offset_K", 0), number(path, sensor, "gain_error", 0)};
+                 number(path, sensor, "lag_s", 0), number(path, sensor, "offset_K", 0),
+                 number(path, sensor, "gain_error", 0)};
 
   const thermal::SetCheck check = thermal::validate(set, thermal::estimator_dt_s);
   if (!check.ok()) {
-    refuse(fmt::format("{}: the network cannot be used (problem {} at entry {}); see SetProblem in thermal/validate.hpp.", path,
-                       static_cast<int>(check.problem), check.index));
+    refuse(
+        fmt::format("{}: the network cannot be used (problem {} at entry {}); see SetProblem in thermal/validate.hpp.",
+                    path, static_cast<int>(check.problem), check.index));
   }
   return set;
 }

@@ -8,8 +8,8 @@
 
 namespace boards::host {
 
-/// Throws UserError (usage) for a missing file, broken TOML, an unknown key or name (the nearest is said), a number that
-/// cannot be, or a set that thermal/validate.hpp refuses.
+/// Throws UserError (usage) for a missing file, broken TOML, an unknown key or name (the nearest is said), a number
+/// that cannot be, or a set that thermal/validate.hpp refuses.
 thermal::HeatSet<double> read_heat_set(const std::string& path);
 
 }  // namespace boards::host

@@ -73,7 +73,8 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
   const Scene scene = read_scene(name, scene_folder, overrides);
   RunOptions options{.motor_folder = motor_folder};
   if (hide) {
-    const HiddenMotor motor = hidden_motor({.motor = scene.motor, .hide = hide, .motor_folder = motor_folder, .scene_folder = scene_folder});
+    const HiddenMotor motor =
+        hidden_motor({.motor = scene.motor, .hide = hide, .motor_folder = motor_folder, .scene_folder = scene_folder});
     options.plant_motor = motor.motor;
     options.hidden = motor.hidden;
   }
@@ -148,7 +149,8 @@ int main(int argc, char** argv) {
   run_command->add_option("scene", scene, "a name (see list) or a .toml file")->required();
   run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")
       ->take_all();
-  run_command->add_option("--hide", hide, "seed=N: the motor that record --hide seed=N records; the firmware believes its sheet");
+  run_command->add_option("--hide", hide,
+                          "seed=N: the motor that record --hide seed=N records; the firmware believes its sheet");
   run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str();
   run_command->add_flag("--json", json, "the summary as JSON on standard output");
 

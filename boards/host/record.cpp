@@ -40,9 +40,10 @@ Scene scene_of(const RecordOptions& options) {
   }
   scene = read_scene(options.excitation, options.scene_folder, {});
   if (scene.shaft.kind == Shaft::Kind::free) {
-    throw wire::pc::UserError(wire::pc::Exit::usage,
-                              "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with "
-                              "an imposed speed or a locked rotor.");
+    throw wire::pc::UserError(
+        wire::pc::Exit::usage,
+        "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with "
+        "an imposed speed or a locked rotor.");
   }
   return scene;
 }

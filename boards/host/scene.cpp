@@ -76,7 +76,12 @@ struct Reader {
 
   Slots top() {
     Scene& s = scene;
-    return {{{"title", &s.title}, {"note", &s.note}, {"motor", &s.motor}, {"board", &s.board}, {"trust", &s.trust}, {"model", &s.model}},
+    return {{{"title", &s.title},
+             {"note", &s.note},
+             {"motor", &s.motor},
+             {"board", &s.board},
+             {"trust", &s.trust},
+             {"model", &s.model}},
             {{"seconds", {&s.seconds, 1e-3, day_s}},
              {"log_Hz", {&s.log_Hz, 0.1, 20000}},
              {"seed", {&seed, 0, 4294967295.0}},

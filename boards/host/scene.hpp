@@ -48,7 +48,7 @@ struct Scene {
   std::string motor = "ec-16-40w";
   std::string board = "h8-15d";  // rating of the power stage: h8-15d or h8-17.5d
   std::string trust = "exact";   // in the motor's thermal values: exact (the simulated motor's own), identified, sheet
-  std::string model;                 // a heat-network file of identify that the firmware runs; empty: from the motor
+  std::string model;             // a heat-network file of identify that the firmware runs; empty: from the motor
   double seconds = 1;
   double log_Hz = 1000;
   unsigned seed = 1;
