@@ -39,7 +39,7 @@ struct Slots {
 };
 
 void put_number(const std::string& place, const std::string& key, const Number& slot, double value) {
-  if (!(value >= slot.low && value <= slot.high)) {
+  if (!std::isgreaterequal(value, slot.low) || !std::islessequal(value, slot.high)) {  // quiet for NaN
     refuse(fmt::format("{}: {} = {} is out of range; give {} to {}.", place, key, value, slot.low, slot.high));
   }
   *slot.value = value;
