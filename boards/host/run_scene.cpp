@@ -244,8 +244,7 @@ Row Board::row(int axis, double time_s, double demand) const {
   row.id_A = static_cast<double>(fast.current_A.d);
   row.iq_A = static_cast<double>(fast.current_A.q);
   row.bus_A = static_cast<double>(slow_sample(bench_.board_raw(), design_.sensors).bus_A);
-  row.depth_ratio =
-      std::numbers::sqrt3 * static_cast<double>(std::hypot(fast.voltage_V.d, fast.voltage_V.q) / fast.bus_V);
+  row.depth_ratio = modulation_depth(doors_[axis].next());
   row.estimated_core_degC = hottest_degC(state);
   row.core_sigma_K = static_cast<double>(state.core_sigma_K);
   row.true_core_degC = truth.hottest_degC;

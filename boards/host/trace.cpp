@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "wire/pc/plot.hpp"
 
@@ -68,6 +70,13 @@ double smallest_allowance_A(const Trace& trace) {
 }
 
 }  // namespace
+
+double modulation_depth(const hal::Duty& duty) {
+  if (!duty.on) return 0;
+  const double a = static_cast<double>(duty.ratio.a), b = static_cast<double>(duty.ratio.b),
+               c = static_cast<double>(duty.ratio.c);
+  return std::hypot((2 * a - b - c) / std::numbers::sqrt3, b - c);
+}
 
 std::string csv(const Result& result, const Trace& trace) {
   std::string out = fmt::format("# hotcore scene {} (simulated), motor {}{}, limiter {}, axis {}, seed {}\n",

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "boards/host/scene.hpp"
+#include "hal/axis_port.hpp"
 #include "wire/codes.hpp"
 
 namespace boards::host {
@@ -21,7 +22,7 @@ struct Row {
   double speed_rad_per_s;
   double torque_Nm, shaft_W;
   double bus_V, bus_A;
-  double depth_ratio;          // modulation depth: peak of the line-to-line voltage over the bus voltage
+  double depth_ratio;          // modulation depth of the pulses, see modulation_depth
   double estimated_core_degC;  // hottest phase winding, as the firmware believes
   double core_sigma_K;
   double true_core_degC;     // hottest phase winding of the simulated motor
@@ -32,6 +33,9 @@ struct Row {
   wire::Limit limit;
   wire::Fault fault;
 };
+
+/// Peak of the pulses' line-to-line voltage over the bus voltage, dead-time compensation included; 0: bridge open.
+double modulation_depth(const hal::Duty& duty);
 
 struct Trace {
   Limiter limiter;

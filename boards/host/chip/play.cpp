@@ -28,14 +28,6 @@ double counts_to_degC(double counts) {
   return 1 / (1 / 298.15 + std::log(ohm / 10e3) / 3950) - 273.15;
 }
 
-/// Modulation depth of the pulses on the pins: peak of the line-to-line voltage over the bus voltage. 0: gates open.
-double depth_of(const hal::Duty& duty) {
-  if (!duty.on) return 0;
-  const double a = static_cast<double>(duty.ratio.a), b = static_cast<double>(duty.ratio.b),
-               c = static_cast<double>(duty.ratio.c);
-  return std::hypot((2 * a - b - c) / std::sqrt(3.0), b - c);
-}
-
 }  // namespace
 
 ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const std::string& motor_folder,
@@ -156,7 +148,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
       row.shaft_W = shafts[t.axis] / summed;
       row.bus_V = pcb.bench.bus_V();
       row.bus_A = static_cast<double>(door.bus_A);
-      row.depth_ratio = depth_of(pcb.duty(t.axis));
+      row.depth_ratio = host::modulation_depth(pcb.duty(t.axis));
       row.estimated_core_degC =
           static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
       row.core_sigma_K = static_cast<double>(state.core_sigma_K);
