@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <optional>
 
@@ -39,22 +40,28 @@ constexpr const char* examples =
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
-/// Shows how far a run is, on the terminal and only if it lasts.
+/// Shows how far a run is once it lasts longer than a second: in place on a terminal, else a line each quarter.
 class Progress {
  public:
   explicit Progress(const std::string& what) : what_(what) {}
   ~Progress() {
-    if (shown_) std::fputs("\r\033[K", stderr);
+    if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
   }
   void operator()(double share) {
-    if (isatty(STDERR_FILENO) == 0) return;
-    fmt::print(stderr, "\r  {} {:3.0f} %", what_, 100 * share);
+    if (std::chrono::steady_clock::now() - start_ < std::chrono::seconds(1)) return;
+    const int quarter = static_cast<int>(4 * share);
+    if (!terminal_ && quarter <= quarter_) return;
+    quarter_ = quarter;
+    fmt::print(stderr, terminal_ ? "\r  {} {:3.0f} %" : "  {} {:3.0f} %\n", what_, 100 * share);
     std::fflush(stderr);
     shown_ = true;
   }
 
  private:
   std::string what_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  const bool terminal_ = isatty(STDERR_FILENO) != 0;
+  int quarter_ = 0;
   bool shown_ = false;
 };
 
