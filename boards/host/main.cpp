@@ -52,7 +52,7 @@ class Progress {
     const int quarter = static_cast<int>(4 * share);
     if (!terminal_ && quarter <= quarter_) return;
     quarter_ = quarter;
-    fmt::print(stderr, terminal_ ? "\r  {} {:3.0f} %" : "  {} {:3.0f} %\n", what_, 100 * share);
+    fmt::print(stderr, "{}  {} {:3.0f} %{}", terminal_ ? "\r" : "", what_, 100 * share, terminal_ ? "" : "\n");
     std::fflush(stderr);
     shown_ = true;
   }
