@@ -50,7 +50,7 @@ std::string as_text(const Report& r, bool explain) {
                    b = std::isnan(without.core_K) ? without.housing_K : without.core_K;
       if (a > 1.15 * b) {
         s += "  The coefficient of copper, which is certain, makes the fit WORSE: without it two errors cancel.\n"
-             "  Some heat does not follow the current.\n";
+             "  Some heat does not follow the current, or the cooling is not constant.\n";
       }
     }
   }
