@@ -22,11 +22,11 @@ install_missing() {
   DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# set_up PRESET: packages, configuration, build. The root folder is $here.
+# set_up PRESET [TARGET]: packages, configuration, build (all of it, or one target). The root folder is $here.
 set_up() {
   local preset=$1
   install_missing "${packages_host[@]}"
   [[ "$preset" == qemu-m4f || "$preset" == h8-15d ]] && install_missing "${packages_qemu_m4f[@]}"
   say "Building: $preset"
-  (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" >&2)
+  (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" ${2:+--target "$2"} >&2)
 }
