@@ -22,7 +22,8 @@ constexpr double least_factor = 0.6, largest_factor = 1.8;
 constexpr double least_error_K = 3, largest_error_K = 10;  // of an estimator that does not know the effect
 // Resistance as a thermometer: a reading now and then, when the motor happens to stand still.
 constexpr double ohmmeter_K = 2, ohmmeter_every_s = 30;
-// A motor that is not known yet is kept this far below its limit: R1 x 1.8 and C1 x 0.6 at once must not burn it.
+// A motor that is not known yet is kept this far below its limit: a design value of ours, not proven for the worst draw;
+// every recording states how hot the winding really became.
 constexpr double unknown_motor_margin_K = 40;
 
 /// Effects that cannot show on a bench with one loaded motor and this firmware: the offset is learnt away, the other

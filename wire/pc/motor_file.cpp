@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "wire/pc/names.hpp"
 #include "wire/pc/toml_file.hpp"
