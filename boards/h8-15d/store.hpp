@@ -10,17 +10,9 @@
 #include <cstring>
 
 #include "firmware/driver.hpp"
+#include "wire/crc.hpp"
 
 namespace h8_15d {
-
-/// CRC-32 (IEEE 802.3), bit by bit: records are small and rare.
-constexpr std::uint32_t crc32(const std::uint8_t* data, std::size_t bytes, std::uint32_t crc = 0xFFFFFFFFu) {
-  for (std::size_t i = 0; i < bytes; ++i) {
-    crc ^= data[i];
-    for (int b = 0; b < 8; ++b) crc = (crc >> 1) ^ ((crc & 1) ? 0xEDB88320u : 0);
-  }
-  return crc;
-}
 
 struct RecordHeader {
   std::uint32_t magic, bytes, serial, crc;  // crc: of the payload, begun with the serial number
@@ -34,7 +26,7 @@ struct Record {
   std::uint32_t crc_now() const {
     std::uint8_t raw[sizeof(Payload)];
     std::memcpy(raw, &payload, sizeof raw);
-    return crc32(raw, sizeof raw, ~header.serial);
+    return wire::crc32(raw, sizeof raw, ~header.serial);
   }
   void seal(std::uint32_t serial) {
     header = {magic, sizeof(Payload), serial, 0};
