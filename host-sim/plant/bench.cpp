@@ -82,15 +82,31 @@ void Bench::renew_resistance(Axis& axis) {
 }
 
 void Bench::advance_period(const std::array<hal::Duty, 2>& duty) {
+  for (std::size_t i = 0; i < axes; ++i) move(axes_[i], duty[i]);
+  share();
+}
+
+void Bench::advance_axis(int axis, const hal::Duty& duty) {
+  move(axes_[static_cast<std::size_t>(axis)], duty);
+  if (axis == 0)
+    share();
+  else
+    sense();
+}
+
+void Bench::move(Axis& axis, const hal::Duty& duty) {
+  axis.bridge.advance(axis.motor, duty, supply_.bus_V(), axis.phase_ohm);
+  axis.current2_sum_A2 += axis.motor.current_squared_A2();
+  axis.enabled_periods += duty.on;
+}
+
+/// What both axes have in common goes on by one period.
+void Bench::share() {
   const double bus_V = supply_.bus_V();
   double load_J = 0;
-  for (std::size_t i = 0; i < axes; ++i) {
-    Axis& axis = axes_[i];
-    axis.bridge.advance(axis.motor, duty[i], bus_V, axis.phase_ohm);
+  for (Axis& axis : axes_) {
     load_J += axis.bridge.work().bus_J - axis.bus_charged_J;
     axis.bus_charged_J = axis.bridge.work().bus_J;
-    axis.current2_sum_A2 += axis.motor.current_squared_A2();
-    axis.enabled_periods += duty[i].on;
   }
   supply_.advance(period_s_, load_J);
   bus_A_ += bus_filter_share_ * (load_J / (period_s_ * std::fmax(bus_V, 1.0)) - bus_A_);

@@ -92,6 +92,9 @@ class Bench {
   Bench(const BenchDesign& design, std::uint64_t seed);
 
   void advance_period(const std::array<hal::Duty, 2>& duty);
+  /// One axis alone, for a board whose axes alternate and which calls this at the end of each axis' own period. Supply,
+  /// heat and slow sensors go on with axis 0; axis 1 sees a bus voltage half a period old.
+  void advance_axis(int axis, const hal::Duty& duty);
 
   const AxisRaw& raw(int axis) const { return raw_[axis]; }
   const BoardRaw& board_raw() const { return board_raw_; }
@@ -128,6 +131,8 @@ class Bench {
     long enabled_periods = 0;
     long encoder_start = 0, last_turns = 0;
   };
+  void move(Axis& axis, const hal::Duty& duty);
+  void share();
   void warm();
   void renew_resistance(Axis& axis);
   void sense();

@@ -93,6 +93,34 @@ TEST(Image, TurnsBothRotorsAndFollowsTheIndex) {
   NO_TROUBLE(*pcb);
 }
 
+TEST(Image, EachMotorFeelsItsDutiesFromTopToTopOfItsOwnTimer) {
+  NEEDS_IMAGE(image);
+  Options o;
+  o.locked = false;
+  auto pcb = board(o);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 3.0f, 3.0f, 0.05);
+  double angle_rad[2], moved_s[2] = {};
+  for (int i : {0, 1}) angle_rad[i] = pcb->bench.truth(i).angle_rad;
+  int steps[2] = {};
+  const double end_s = to_s(pcb->chip.now()) + 1e-3;
+  while (to_s(pcb->chip.now()) < end_s) {
+    pcb->run_for(0.5e-6);
+    for (int i : {0, 1}) {
+      const double now_rad = pcb->bench.truth(i).angle_rad;
+      if (now_rad == angle_rad[i]) continue;
+      angle_rad[i] = now_rad;
+      ++steps[i];
+      moved_s[i] = to_s(pcb->chip.now());
+      EXPECT_LE(moved_s[i] - to_s(pcb->chip.timer(i).last_overflow()), 1e-6) << "axis " << i;
+    }
+  }
+  EXPECT_EQ(steps[0], 20);
+  EXPECT_EQ(steps[1], 20);
+  EXPECT_NEAR(std::abs(moved_s[0] - moved_s[1]), 25e-6, 1e-6);
+  NO_TROUBLE(*pcb);
+}
+
 TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
   NEEDS_IMAGE(image);
   for (const double electrical_turns : {0.05, 0.30, 0.47, 0.70, 0.95}) {

@@ -69,9 +69,11 @@ void Pcb::flash_parameters(const firmware::AxisSetup (&axes)[2], std::uint32_t s
 
 void Pcb::power_on(std::uint32_t seed, bool keep_backup) {
   chip.power_on(seed, keep_backup);
-  advanced_ = chip.now();
-  for (int i = 0; i < 2; ++i) set_fault_pin(i, false);
-  move_pins();
+  advanced_.fill(chip.now());
+  for (int i = 0; i < 2; ++i) {
+    set_fault_pin(i, false);
+    move_pins(i);
+  }
 }
 
 void Pcb::set_fault_pin(int axis, bool fault) { chip.set_pin(wiring[axis].fault, !fault); }
@@ -80,14 +82,15 @@ void Pcb::run_for(double seconds) {
   const Time end = chip.now() + from_s(seconds), step = from_s(pwm_period_s_);
   while (chip.now() < end) {
     chip.run_until(std::min(end, chip.now() + step));
-    // No counter, no period: the plant goes on by itself with open gates.
-    while (chip.now() - advanced_ > step + step / 2) {
-      last_ = {gates(0, nullptr), gates(1, nullptr)};
-      for (auto& d : last_) {
-        if (!chip.tim1.running()) d.on = false;
+    // No counter, no period: the motor goes on by itself with open gates.
+    for (int i = 0; i < 2; ++i) {
+      auto& last = last_[static_cast<std::size_t>(i)];
+      const Time& advanced = advanced_[static_cast<std::size_t>(i)];
+      while (chip.now() - advanced > step + step / 2) {
+        last = gates(i, nullptr);
+        if (!chip.timer(i).running()) last.on = false;
+        advance(i, advanced + step);
       }
-      advanced_ += step;
-      advance();
     }
   }
 }
@@ -140,36 +143,32 @@ void Pcb::period_ended(int bridge, Time when) {
       chip.report("the two timers do not stand half a period apart", chip.timer(bridge).base());
     }
   }
-  if (bridge != 0) return;
-  advanced_ = when;
-  advance();
+  advance(bridge, when);
 }
 
-void Pcb::advance() {
-  bench.advance_period(last_);
-  ++periods_;
-  move_pins();
+void Pcb::advance(int axis, Time when) {
+  advanced_[static_cast<std::size_t>(axis)] = when;
+  bench.advance_axis(axis, last_[static_cast<std::size_t>(axis)]);
+  move_pins(axis);
 }
 
-void Pcb::move_pins() {
-  for (int i = 0; i < 2; ++i) {
-    const auto n = static_cast<std::size_t>(i);
-    const host_sim::AxisRaw& raw = bench.raw(i);
-    edges_[n] += static_cast<std::int16_t>(static_cast<std::uint16_t>(raw.encoder_counts - counter_[n]));
-    counter_[n] = raw.encoder_counts;
-    EncoderTimer& counter = i == 0 ? chip.tim3 : chip.tim4;
-    counter.set_edges(edges_[n]);
-    for (int k = 0; k < 3; ++k) chip.set_pin(wiring[i].hall[k], raw.hall >> k & 1);
-    const std::uint32_t crossed = raw.index_pulses - pulses_[n];
-    pulses_[n] = raw.index_pulses;
-    if (crossed) {
-      counter.set_index_edges(
-          edges_[n] + static_cast<std::int16_t>(static_cast<std::uint16_t>(raw.index_latch - raw.encoder_counts)));
-      chip.set_pin(wiring[i].index, false);
-      chip.set_pin(wiring[i].index, true);
-    }
-    chip.set_pin(wiring[i].index, raw.encoder_counts % 4096 == 0);
+void Pcb::move_pins(int axis) {
+  const auto n = static_cast<std::size_t>(axis);
+  const host_sim::AxisRaw& raw = bench.raw(axis);
+  edges_[n] += static_cast<std::int16_t>(static_cast<std::uint16_t>(raw.encoder_counts - counter_[n]));
+  counter_[n] = raw.encoder_counts;
+  EncoderTimer& counter = axis == 0 ? chip.tim3 : chip.tim4;
+  counter.set_edges(edges_[n]);
+  for (int k = 0; k < 3; ++k) chip.set_pin(wiring[axis].hall[k], raw.hall >> k & 1);
+  const std::uint32_t crossed = raw.index_pulses - pulses_[n];
+  pulses_[n] = raw.index_pulses;
+  if (crossed) {
+    counter.set_index_edges(
+        edges_[n] + static_cast<std::int16_t>(static_cast<std::uint16_t>(raw.index_latch - raw.encoder_counts)));
+    chip.set_pin(wiring[axis].index, false);
+    chip.set_pin(wiring[axis].index, true);
   }
+  chip.set_pin(wiring[axis].index, raw.encoder_counts % 4096 == 0);
 }
 
 std::uint32_t Pcb::analog(int, int channel, Time closed) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The printed circuit board of the H8-15D in numbers: joins the pins of the chip model to the plant of host-sim, by the
-// pin table of boards/h8-15d/README.md and not by the driver's board.hpp, so that a swapped pin shows. The plant takes
-// steps of TIM1's period for both axes; axis 1 acts half a period later on the pins, which is checked there and not
-// felt by the motor. What the driver does to the power stage that no power stage stands is reported as the firmware's
-// mistake.
+// pin table of boards/h8-15d/README.md and not by the driver's board.hpp, so that a swapped pin shows. Each axis' motor
+// takes steps of its own timer's period, from top to top, so axis 1 feels its duties half a period after axis 0. What
+// the driver does to the power stage that no power stage stands is reported as the firmware's mistake.
 #pragma once
 
 #include <array>
@@ -39,7 +38,6 @@ class Pcb final : public host_sim::chip::Board {
   bool gates_open(int axis) const { return !last_[static_cast<std::size_t>(axis)].on; }
   hal::Duty duty(int axis) const { return gates(axis, nullptr); }
   void set_fault_pin(int axis, bool fault);
-  std::uint64_t periods() const { return periods_; }
 
   // chip::Board
   void period_ended(int bridge, host_sim::chip::Time when) override;
@@ -51,8 +49,8 @@ class Pcb final : public host_sim::chip::Board {
 
  private:
   hal::Duty gates(int axis, std::string* complaint) const;
-  void advance();
-  void move_pins();
+  void advance(int axis, host_sim::chip::Time when);
+  void move_pins(int axis);
   std::uint32_t door_address() const;
 
   double pwm_period_s_, dead_time_s_;
@@ -60,8 +58,7 @@ class Pcb final : public host_sim::chip::Board {
   std::array<std::int64_t, 2> edges_{};
   std::array<std::uint16_t, 2> counter_{};
   std::array<std::uint32_t, 2> pulses_{};
-  host_sim::chip::Time advanced_ = 0;
-  std::uint64_t periods_ = 0;
+  std::array<host_sim::chip::Time, 2> advanced_{};  // until when each axis' motor has come
 };
 
 }  // namespace boards

@@ -96,7 +96,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
   for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis)
     play.result.traces.push_back({host::Limiter::governor, axis, {}});
   pcb.chip.core().clear_counts();
-  const std::uint64_t first_period = pcb.periods();
+  const double first_s = to_s(pcb.chip.now());
   const int log_ms = std::max(1, static_cast<int>(std::lround(1000 / scene.log_Hz)));
   const int total_ms = static_cast<int>(std::lround(scene.seconds * 1000));
   double squares[2] = {}, speeds[2] = {}, torques[2] = {}, shafts[2] = {};
@@ -176,8 +176,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
     play.lane_mean[lane] =
         static_cast<double>(count.total) / static_cast<double>(std::max<std::uint64_t>(1, count.calls));
   }
-  const double scene_s = static_cast<double>(pcb.periods() - first_period) * pcb.bench.period_s();
-  play.asleep_share = to_s(pcb.chip.core().slept()) / std::max(scene_s, 1e-9);
+  play.asleep_share = to_s(pcb.chip.core().slept()) / std::max(to_s(pcb.chip.now()) - first_s, 1e-9);
   return play;
 }
 
