@@ -111,14 +111,15 @@ struct SignalAddress {
 };
 inline constexpr int max_signals = 16;  // in one subscription or capture
 
-/// A row every `decimation` PWM periods, 1 = each. Counting of rows and drops starts anew with each subscription.
+/// A row each `decimation` PWM periods, 1 = every one. Ends the subscription before; so do `hello` and no signals at
+/// all.
 struct Subscribe {
   std::uint16_t decimation;
   std::uint16_t zero = 0;
 };
-enum class Edge : std::uint8_t { now = 0, rising = 1, falling = 2, fault = 3 };  // fault: either axis trips
-/// `pre` rows from before the trigger and `post` from it on, one each `decimation` PWM periods. The whole must fit into
-/// hello's capture_words.
+enum class Edge : std::uint8_t { now = 0, rising = 1, falling = 2 };  // passing `level` with this row
+/// `pre` rows from before the trigger and `post` from it on, one each `decimation` PWM periods:
+/// (pre + post) (signals + 1) words, at most hello's capture_words. Ends a capture that was ordered before.
 struct CaptureOrder {
   SignalAddress trigger;
   Edge edge;
@@ -148,7 +149,7 @@ struct Hello {
   std::uint8_t axes;
   std::uint8_t zero[3]{};
   float pwm_Hz;
-  std::uint32_t capture_words;  // rows times signals of a capture
+  std::uint32_t capture_words;  // a row takes one a signal and one more
   char board[16];
   char firmware[16];  // version
   char serial[28];    // as in the USB string descriptor
@@ -234,11 +235,12 @@ struct CaptureStatus {
   std::uint32_t trigger_period;  // of row `pre`
 };
 
-/// `rows` times `signals` values follow, row by row. Row k is of PWM period first_period + k * decimation.
+/// `rows` times `signals` values follow, row by row. Row k is of PWM period first_period + k * decimation: where
+/// periods are missing, a new frame begins.
 struct Rows {
   Answer answer;
   std::uint32_t first_period;
-  std::uint32_t dropped;  // telemetry: rows lost since the subscription began, before these. capture_read: first row
+  std::uint32_t dropped;  // rows lost since the subscription began, before these; 0 in a capture
   std::uint16_t decimation;
   std::uint8_t signals, rows;
 };
