@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#include "console/plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace console {
+namespace {
+
+constexpr int scale_width = 8;  // characters of the scale at the left
+constexpr std::array<int, 6> ansi_colours = {36, 33, 35, 32, 31, 34};  // told apart on dark and on light grounds
+
+struct Cell {
+  unsigned dots = 0;
+  std::size_t line = 0;  // whose colour it has: the last one drawn
+};
+
+/// Bit of a dot in its Braille cell (Unicode block 2800), x 0..1, y 0..3 downwards.
+unsigned dot(int x, int y) {
+  constexpr unsigned bits[4][2] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
+  return bits[y][x];
+}
+
+std::string utf8(unsigned code) {
+  return {static_cast<char>(0xE0 | code >> 12), static_cast<char>(0x80 | ((code >> 6) & 0x3F)),
+          static_cast<char>(0x80 | (code & 0x3F))};
+}
+
+struct Range {
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+};
+
+Range range_of(const std::vector<PlotLine>& lines, std::size_t columns, float least_span) {
+  Range range;
+  for (const PlotLine& line : lines) {
+    const std::size_t first = line.values.size() - std::min(columns, line.values.size());
+    for (std::size_t i = first; i < line.values.size(); ++i) {
+      if (!std::isfinite(line.values[i])) continue;
+      range.low = std::min(range.low, line.values[i]);
+      range.high = std::max(range.high, line.values[i]);
+    }
+  }
+  if (range.low > range.high) return {0, least_span};
+  const float lacking = std::max(0.0f, least_span - (range.high - range.low)) / 2;  // huge spans lack nothing
+  return {range.low - lacking, range.high + lacking};
+}
+
+}  // namespace
+
+std::string plot(const std::vector<PlotLine>& lines, int width, int height, float least_span, bool colours) {
+  const int cells = std::max(10, width - scale_width - 1), rows = std::max(2, height);
+  const auto columns = static_cast<std::size_t>(2 * cells);
+  const Range range = range_of(lines, columns, least_span);
+  std::vector<Cell> grid(static_cast<std::size_t>(cells * rows));
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const auto& values = lines[l].values;
+    const std::size_t shown = std::min(columns, values.size());
+    int last_y = -1;
+    for (std::size_t i = 0; i < shown; ++i) {
+      const float value = values[values.size() - shown + i];
+      if (!std::isfinite(value)) {
+        last_y = -1;
+        continue;
+      }
+      const double share = (double{range.high} - double{value}) / (double{range.high} - double{range.low});
+      const int y = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * (4 * rows - 1)));
+      const int x = static_cast<int>(columns - shown + i);
+      // A steep curve stays connected: the dots between it and its last column are drawn as well.
+      const int from = last_y < 0 ? y : std::min(y, last_y + 1);
+      const int to = last_y < 0 ? y : std::max(y, last_y - 1);
+      for (int d = from; d <= to; ++d) {
+        Cell& cell = grid[static_cast<std::size_t>(d / 4 * cells + x / 2)];
+        cell.dots |= dot(x % 2, d % 4);
+        cell.line = l;
+      }
+      last_y = y;
+    }
+  }
+  std::string text;
+  for (int row = 0; row < rows; ++row) {
+    std::string scale;
+    if (row == 0) scale = fmt::format("{:.4g}", range.high);
+    if (row == rows - 1) scale = fmt::format("{:.4g}", range.low);
+    text += fmt::format("{:>{}} ", scale, scale_width);
+    for (int c = 0; c < cells; ++c) {
+      const Cell& cell = grid[static_cast<std::size_t>(row * cells + c)];
+      if (cell.dots == 0)
+        text += ' ';
+      else if (colours)
+        text += fmt::format("\033[{}m{}\033[0m", ansi_colours[cell.line % ansi_colours.size()], utf8(0x2800 + cell.dots));
+      else
+        text += utf8(0x2800 + cell.dots);
+    }
+    text += '\n';
+  }
+  text += std::string(scale_width + 1, ' ');
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const std::string label = (l == 0 ? "" : "   ") + lines[l].label;
+    text += colours ? fmt::format("\033[{}m{}\033[0m", ansi_colours[l % ansi_colours.size()], label) : label;
+  }
+  return text + '\n';
+}
+
+}  // namespace console
