@@ -11,7 +11,7 @@
 namespace console {
 namespace {
 
-constexpr int scale_width = 8;  // characters of the scale at the left
+constexpr int scale_width = 8;                                         // characters of the scale at the left
 constexpr std::array<int, 6> ansi_colours = {36, 33, 35, 32, 31, 34};  // told apart on dark and on light grounds
 
 struct Cell {
@@ -91,7 +91,8 @@ std::string plot(const std::vector<PlotLine>& lines, int width, int height, floa
       if (cell.dots == 0)
         text += ' ';
       else if (colours)
-        text += fmt::format("\033[{}m{}\033[0m", ansi_colours[cell.line % ansi_colours.size()], utf8(0x2800 + cell.dots));
+        text +=
+            fmt::format("\033[{}m{}\033[0m", ansi_colours[cell.line % ansi_colours.size()], utf8(0x2800 + cell.dots));
       else
         text += utf8(0x2800 + cell.dots);
     }

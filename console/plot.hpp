@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Curves in a terminal: Braille characters, each two dots wide and four high, a scale at the left, colours by ANSI codes.
+// Curves in a terminal: Braille characters, each two dots wide and four high, a scale at the left, colours by ANSI
+// codes.
 #pragma once
 
 #include <string>
@@ -12,8 +13,8 @@ struct PlotLine {
   std::vector<float> values;  // oldest first, one per column of dots; NaN leaves a gap
 };
 
-/// `height` lines of text and one of labels, each `width` characters wide at most, each ended by a line feed. The newest
-/// value stands at the right edge; older values than fit are left out. `least_span`: the scale never shows less.
+/// `height` lines of text and one of labels, each `width` characters wide at most, each ended by a line feed. The
+/// newest value stands at the right edge; older values than fit are left out. `least_span`: the scale never shows less.
 std::string plot(const std::vector<PlotLine>& lines, int width, int height, float least_span, bool colours);
 
 }  // namespace console

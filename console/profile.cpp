@@ -53,15 +53,17 @@ std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
     std::string_view rest = part;
     const bool read = quantity(rest, ampere_units, piece.current_A) && quantity(rest, second_units, piece.seconds);
     if (!read || rest.find_first_not_of(' ') != std::string_view::npos || !(piece.seconds > 0)) {
-      throw UserError(Exit::usage,
-                      fmt::format("'{}' is no piece of a current profile; write amperes and seconds, such as \"20A 0.3s, 6A 5s\".",
-                                  part));
+      throw UserError(
+          Exit::usage,
+          fmt::format("'{}' is no piece of a current profile; write amperes and seconds, such as \"20A 0.3s, 6A 5s\".",
+                      part));
     }
     pieces.push_back(piece);
   }
   if (pieces.empty() || pieces.size() > most) {
-    throw UserError(Exit::usage, fmt::format("The current profile has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
-                                             pieces.size(), most));
+    throw UserError(Exit::usage,
+                    fmt::format("The current profile has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
+                                pieces.size(), most));
   }
   return pieces;
 }

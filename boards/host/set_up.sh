@@ -1,7 +1,7 @@
 # Sourced by ./run and ./test: installs what is missing (Debian, root or sudo) and builds one preset. Quick when nothing is to do.
 
 packages_host=(g++ cmake ninja-build libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev
-               libgtest-dev gnuplot-nox libunicorn-dev)
+               libgtest-dev gnuplot-nox libunicorn-dev pkg-config libusb-1.0-0-dev libedit-dev umockdev libumockdev-dev)
 packages_qemu_m4f=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 
 say() { printf '\033[1m%s\033[0m\n' "$*" >&2; }

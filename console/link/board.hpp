@@ -8,8 +8,8 @@
 //       if (const auto state = state_in(*frame)) ...
 //   }
 //
-// No memory is taken after the constructor. A frame that is torn or fails its CRC is counted and dropped; nothing that a
-// device sends is believed before it was checked (console/link/messages.hpp). Not for two threads at a time.
+// No memory is taken after the constructor. A frame that is torn or fails its CRC is counted and dropped; nothing that
+// a device sends is believed before it was checked (console/link/messages.hpp). Not for two threads at a time.
 #pragma once
 
 #include <array>
@@ -27,7 +27,8 @@ class Board {
  public:
   explicit Board(std::unique_ptr<Transport> transport) : transport_(std::move(transport)) {}
 
-  /// Sends a frame. Its sequence number, which the reply repeats; nothing while the way out is full or the board is gone.
+  /// Sends a frame. Its sequence number, which the reply repeats; nothing while the way out is full or the board is
+  /// gone.
   std::optional<std::uint8_t> write(std::uint8_t kind, std::span<const std::uint8_t> payload);
 
   /// The next frame that has arrived whole, or nullptr. It holds until the next call. Looks at 4 KB at most, so that a
@@ -37,6 +38,7 @@ class Board {
   /// Returns when something has happened, at the latest after so many milliseconds.
   void wait(int milliseconds) { transport_->wait(milliseconds); }
 
+  double now_s() const { return transport_->now_s(); }
   bool gone() const { return transport_->gone(); }
   /// Frames that did not arrive whole.
   std::uint32_t bad_frames() const { return reader_.bad(); }

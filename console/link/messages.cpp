@@ -26,7 +26,8 @@ bool text(std::span<const std::uint8_t>& rest, std::string& out) {
   const auto end = std::find(rest.begin(), rest.end(), std::uint8_t{0});
   if (end == rest.end()) return false;
   out.assign(rest.begin(), end);
-  std::replace_if(out.begin(), out.end(), [](char c) { return !printable(c); }, '?');
+  std::replace_if(
+      out.begin(), out.end(), [](char c) { return !printable(c); }, '?');
   rest = rest.subspan(static_cast<std::size_t>(end - rest.begin()) + 1);
   return true;
 }
@@ -46,7 +47,8 @@ bool described(const wire::Frame& frame, wire::Kind kind, Head& head, Descriptio
   head = *message;
   auto rest = std::span(frame.payload, frame.bytes).subspan(sizeof(Head));
   if (!text(rest, d.name) || !text(rest, d.unit) || !text(rest, d.doc)) return false;
-  if (!is_name(d.name) || (!d.unit.empty() && !is_name(d.unit)) || head.axes < 1 || head.axes > wire::axes) return false;
+  if (!is_name(d.name) || (!d.unit.empty() && !is_name(d.unit)) || head.axes < 1 || head.axes > wire::axis_count)
+    return false;
   d.id = head.id;
   d.per_axis = head.axes > 1;
   return true;
@@ -67,7 +69,7 @@ std::optional<wire::Hello> hello_in(const wire::Frame& frame) {
   tidy(hello->firmware);
   tidy(hello->serial);
   if (hello->protocol != wire::protocol_version) return hello;  // whatever else it says means something else
-  const bool sane = hello->axes >= 1 && hello->axes <= wire::axes && hello->pwm_Hz >= 1000.0f &&
+  const bool sane = hello->axes >= 1 && hello->axes <= wire::axis_count && hello->pwm_Hz >= 1000.0f &&
                     hello->pwm_Hz <= 1e6f && hello->max_payload <= wire::max_payload;
   return sane ? hello : std::nullopt;
 }
@@ -91,10 +93,9 @@ std::optional<Description> signal_in(const wire::Frame& frame) {
 }
 
 bool values_in(const wire::Frame& frame, std::span<float> values) {
-  const auto list = message_in<wire::List>(frame, wire::Kind::get);
-  if (!list || list->count != values.size()) return false;
-  if (frame.bytes != sizeof(wire::List) + values.size_bytes()) return false;
-  if (!values.empty()) std::memcpy(values.data(), frame.payload + sizeof(wire::List), values.size_bytes());
+  const auto answer = message_in<wire::Answer>(frame, wire::Kind::get);
+  if (!answer || frame.bytes != sizeof(wire::Answer) + values.size_bytes()) return false;
+  if (!values.empty()) std::memcpy(values.data(), frame.payload + sizeof(wire::Answer), values.size_bytes());
   return true;
 }
 

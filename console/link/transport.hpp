@@ -5,9 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
-#include <string>
 
 namespace console::link {
 
@@ -23,7 +21,11 @@ class Transport {
   virtual std::size_t read(std::span<std::uint8_t> room) = 0;
   /// Returns when something has happened, at the latest after so many milliseconds. 0 only looks.
   virtual void wait(int milliseconds) = 0;
-  /// True from the moment at which the board was seen to be unplugged or to have failed. It does not come back: open anew.
+  /// The clock by which to pace and to give up, in seconds from anywhere: a simulated board may be faster than the
+  /// world.
+  virtual double now_s() const = 0;
+  /// True from the moment at which the board was seen to be unplugged or to have failed. It does not come back: open
+  /// anew.
   virtual bool gone() const = 0;
 
  protected:

@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <optional>
+
+#include "wire/protocol.hpp"
 
 namespace console::link {
 namespace {
@@ -49,14 +52,16 @@ std::string place_of(libusb_device* device) {
   std::array<std::uint8_t, 7> ports{};  // the deepest chain that USB allows
   const int depth = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
   std::string place = fmt::format("bus {}", libusb_get_bus_number(device));
-  for (int i = 0; i < depth; ++i) place += fmt::format("{}{}", i == 0 ? " port " : ".", ports[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < depth; ++i)
+    place += fmt::format("{}{}", i == 0 ? " port " : ".", ports[static_cast<std::size_t>(i)]);
   return place;
 }
 
 /// A string descriptor; what is not printable ASCII becomes '?', since it goes to a terminal.
 std::string text_of(libusb_device_handle* handle, std::uint8_t index) {
   std::array<unsigned char, 256> bytes{};
-  const int n = index == 0 ? 0 : libusb_get_string_descriptor_ascii(handle, index, bytes.data(), static_cast<int>(bytes.size()));
+  const int n =
+      index == 0 ? 0 : libusb_get_string_descriptor_ascii(handle, index, bytes.data(), static_cast<int>(bytes.size()));
   std::string text(reinterpret_cast<const char*>(bytes.data()), static_cast<std::size_t>(std::clamp(n, 0, 255)));
   for (char& c : text) c = c >= ' ' && c <= '~' ? c : '?';
   return text;
@@ -97,7 +102,7 @@ std::vector<Seen> look(libusb_context* context) {
   for (ssize_t i = 0; i < count; ++i) {
     libusb_device_descriptor descriptor{};
     if (libusb_get_device_descriptor(devices[i], &descriptor) != 0) continue;
-    if (descriptor.idVendor != vendor_id || descriptor.idProduct != product_id) continue;
+    if (descriptor.idVendor != wire::usb_vendor_id || descriptor.idProduct != wire::usb_product_id) continue;
     Seen seen{{"", "", place_of(devices[i])}, devices[i]};
     libusb_device_handle* handle = nullptr;
     if (const int error = libusb_open(devices[i], &handle); error != 0) {
@@ -164,6 +169,10 @@ class UsbTransport final : public Transport {
   void wait(int milliseconds) override {
     timeval time{milliseconds / 1000, milliseconds % 1000 * 1000};
     libusb_handle_events_timeout_completed(context_, &time, nullptr);
+  }
+
+  double now_s() const override {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   }
 
   bool gone() const override { return gone_; }
@@ -288,13 +297,13 @@ Seen& choose(std::vector<Seen>& boards, const std::string& prefix) {
   }
   if (fitting.size() > 1) {
     std::vector<std::string> names;
-    for (const Seen* seen : fitting) names.push_back(seen->found.serial.empty() ? seen->found.place : seen->found.serial);
+    for (const Seen* seen : fitting)
+      names.push_back(seen->found.serial.empty() ? seen->found.place : seen->found.serial);
     throw UserError(Exit::no_board,
-                    prefix.empty()
-                        ? fmt::format("{} boards are plugged in ({}); choose one with --serial.", names.size(),
-                                      fmt::join(names, ", "))
-                        : fmt::format("{} boards have a serial that begins with '{}' ({}); give more of it.",
-                                      names.size(), prefix, fmt::join(names, ", ")));
+                    prefix.empty() ? fmt::format("{} boards are plugged in ({}); choose one with --serial.",
+                                                 names.size(), fmt::join(names, ", "))
+                                   : fmt::format("{} boards have a serial that begins with '{}' ({}); give more of it.",
+                                                 names.size(), prefix, fmt::join(names, ", ")));
   }
   if (fitting.front()->found.trouble != Exit::answered)
     throw UserError(fitting.front()->found.trouble, fitting.front()->found.sentence);
@@ -305,8 +314,8 @@ Seen& choose(std::vector<Seen>& boards, const std::string& prefix) {
 
 Usb::Usb() {
   if (const int error = libusb_init(&context_); error != 0) {
-    throw UserError(Exit::no_permission,
-                    fmt::format("USB cannot be used here ({}); plug a board in, or try --sim.", libusb_error_name(error)));
+    throw UserError(Exit::no_permission, fmt::format("USB cannot be used here ({}); plug a board in, or try --sim.",
+                                                     libusb_error_name(error)));
   }
 }
 
@@ -337,7 +346,7 @@ std::string udev_rule() {
       "# hotcore boards: the user who sits at the machine, and the group plugdev, may open them.\n"
       "SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{:04x}\", ATTR{{idProduct}}==\"{:04x}\", ATTR{{manufacturer}}==\"{}\", "
       "MODE=\"0660\", GROUP=\"plugdev\", TAG+=\"uaccess\"\n",
-      vendor_id, product_id, manufacturer);
+      wire::usb_vendor_id, wire::usb_product_id, manufacturer);
 }
 
 }  // namespace console::link

@@ -16,17 +16,16 @@ struct libusb_context;
 
 namespace console::link {
 
-/// The test id of pid.codes, a placeholder: others use it too, so the manufacturer's name must fit as well.
-inline constexpr std::uint16_t vendor_id = 0x1209, product_id = 0x0001;
+/// wire's ids are a placeholder that others use too, so the manufacturer's name must fit as well.
 inline constexpr const char* manufacturer = "hotcore";
 
 /// A board seen on the bus.
 struct Found {
-  std::string serial;   // empty when it could not be read
-  std::string product;  // as the device says, printable characters only
-  std::string place;    // "bus 1 port 2.3"
+  std::string serial;                                 // empty when it could not be read
+  std::string product;                                // as the device says, printable characters only
+  std::string place;                                  // "bus 1 port 2.3"
   wire::pc::Exit trouble = wire::pc::Exit::answered;  // why it cannot be talked to
-  std::string sentence = "";                               // and what to do
+  std::string sentence = "";                          // and what to do
 };
 
 class Usb {

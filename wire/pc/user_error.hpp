@@ -8,16 +8,16 @@
 namespace wire::pc {
 
 enum class Exit : int {
-  answered = 0,        // an answer was given
-  usage = 2,           // the command line, a parameter file or a motor file is wrong
-  unusable = 3,        // the data cannot be used
-  no_board = 4,        // no board, or more than one, fits
-  no_permission = 5,   // the system does not let this user reach the board
-  busy = 6,            // another program holds the board
-  gone = 7,            // the board went away or stopped answering in the middle
-  refused = 8,         // the board understood and said no
-  wrong_version = 9,   // board and program speak different versions
-  interrupted = 130,   // Ctrl-C; whatever was armed is disarmed (128 + SIGINT, as shells have it)
+  answered = 0,       // an answer was given
+  usage = 2,          // the command line, a parameter file or a motor file is wrong
+  unusable = 3,       // the data cannot be used
+  no_board = 4,       // no board, or more than one, fits
+  no_permission = 5,  // the system does not let this user reach the board
+  busy = 6,           // another program holds the board
+  gone = 7,           // the board went away or stopped answering in the middle
+  refused = 8,        // the board understood and said no
+  wrong_version = 9,  // board and program speak different versions
+  interrupted = 130,  // Ctrl-C; whatever was armed is disarmed (128 + SIGINT, as shells have it)
 };
 
 class UserError : public std::runtime_error {
