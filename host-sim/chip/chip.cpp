@@ -87,7 +87,8 @@ Chip::Chip()
            {[this] { return rcc.tree().pclk2_Hz; },
             [this](int a, int c, Time t) { return board_ ? board_->analog(a, c, t) : 0; }, [this] { line_of_adcs(); },
             &adc_common}),
-      otg(*this, [this] { return rcc.tree().usb_Hz; }),
+      otg(*this, {[this] { return rcc.tree().usb_Hz; },
+                  [this] { return port('A').is_alternate(11, 10) && port('A').is_alternate(12, 10); }}),
       core_(*this, nvic, flash.mapped()),
       backup_(backup_size) {
   for (char letter : {'A', 'B', 'C', 'D', 'H'}) {

@@ -15,6 +15,7 @@
 #include "host-sim/chip/core.hpp"
 #include "host-sim/chip/flash.hpp"
 #include "host-sim/chip/nvic.hpp"
+#include "host-sim/chip/otg.hpp"
 #include "host-sim/chip/pins.hpp"
 #include "host-sim/chip/power.hpp"
 #include "host-sim/chip/timers.hpp"

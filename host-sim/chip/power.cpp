@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "host-sim/chip/power.hpp"
 
-#include <cmath>
-
 namespace host_sim::chip {
 namespace {
 
@@ -20,14 +18,6 @@ constexpr Register wwdg_map[] = {  // RM0090 22.6
     {Wwdg::cr, "WWDG_CR", 0x7F, 0xFF, 0xFF},
     {Wwdg::cfr, "WWDG_CFR", 0x7F, 0x3FF, 0x3FF},
     {Wwdg::sr, "WWDG_SR", 0, 0x1, 0x1}};
-
-constexpr Register otg_map[] = {
-    // RM0090 34.16
-    {0x00C, "OTG_FS_GUSBCFG", 0x00000A00, 0xE0003FC7, 0xE0003FC7},
-    {0x038, "OTG_FS_GCCFG", 0, 0x003D0000, 0x003D0000},
-    {0x03C, "OTG_FS_CID", 0x00001100, 0xFFFFFFFF, 0xFFFFFFFF},
-    {0x804, "OTG_FS_DCTL", 0, 0x00000FFF, 0x00000FFF},
-};
 
 }  // namespace
 
@@ -154,14 +144,6 @@ void Wwdg::on_write(std::uint32_t offset, std::uint32_t v) {
   from_ = host_.now();
   deadline_ = from_ + count() * (loaded_ - 0x3F);
   host_.reschedule();
-}
-
-OtgFs::OtgFs(Host& host, std::function<double()> usb_Hz)
-    : Device(host, "OTG_FS", address, otg_map, 0x34, 7), usb_Hz_(std::move(usb_Hz)) {}
-
-void OtgFs::on_write(std::uint32_t offset, std::uint32_t value) {
-  if (std::abs(usb_Hz_() - 48e6) > 120e3) trouble("its 48 MHz clock is missing (PLLQ)", offset);
-  keep(offset, value);
 }
 
 }  // namespace host_sim::chip

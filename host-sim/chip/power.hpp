@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PWR with PVD and the backup regulator (RM0090 chapter 5), the 4 KiB backup SRAM, the two watchdogs (chapters 21, 22)
-// and the few registers of OTG_FS that the image touches before it has a USB stack (chapter 34).
+// PWR with PVD and the backup regulator (RM0090 chapter 5), the 4 KiB backup SRAM, the two watchdogs (chapters 21, 22).
 #pragma once
 
 #include <functional>
@@ -76,18 +75,6 @@ class Wwdg : public Device {
   Time from_ = 0, deadline_ = never;
   std::function<double()> pclk1_Hz_;
   std::function<void(const char*)> bite_;
-};
-
-class OtgFs : public Device {
- public:
-  static constexpr std::uint32_t address = 0x50000000;
-  explicit OtgFs(Host& host, std::function<double()> usb_Hz);
-
- protected:
-  void on_write(std::uint32_t offset, std::uint32_t value) override;
-
- private:
-  std::function<double()> usb_Hz_;
 };
 
 }  // namespace host_sim::chip

@@ -1,0 +1,561 @@
+// SPDX-License-Identifier: MIT
+#include "host-sim/chip/otg.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace host_sim::chip {
+namespace {
+
+constexpr std::uint32_t bit(int n) { return 1u << n; }
+// Endpoint control, RM0090 34.16.4.
+constexpr std::uint32_t usbaep = bit(15), dpid = bit(16), naksts = bit(17), stall_bit = bit(21), cnak = bit(26),
+                        snak = bit(27), sd0pid = bit(28), sd1pid = bit(29), epdis = bit(30), epena = bit(31);
+// Endpoint interrupts.
+constexpr std::uint32_t xfrc = bit(0), epdisd = bit(1), stup = bit(3), otepdis = bit(4), ittxfe = bit(4),
+                        inepne = bit(6);
+// Core interrupts; what is cleared by writing 1.
+constexpr std::uint32_t sof = bit(3), rxflvl = bit(4), ginakeff = bit(6), gonakeff = bit(7), esusp = bit(10),
+                        usbsusp = bit(11), usbrst = bit(12), enumdne = bit(13), iepint = bit(18), oepint = bit(19),
+                        wkupint = bit(31);
+constexpr std::uint32_t cleared_by_one = 0xF030FC0A;
+// RX FIFO status, GRXSTSP.PKTSTS.
+enum Status : std::uint32_t { out_nak = 1, out_data = 2, out_done = 3, setup_done = 4, setup_data = 6 };
+
+constexpr std::uint32_t fifo_words = 320;   // 1.25 KiB, 34.11
+constexpr std::uint32_t setup_words = 10;   // always kept free for three SETUP packets, 34.11.1
+constexpr Time force_time = from_s(25e-3);  // GUSBCFG.FDMOD, 34.16.2
+constexpr Time reset_time = from_s(10e-3);  // USB 2.0 7.1.7.5, the shortest a port drives
+constexpr Time frame_time = from_s(1e-3), idle_time = from_s(3e-3);  // USB 2.0 7.1.7.6
+constexpr Time core_reset_time = from_s(3 / 48e6);                   // three PHY clocks
+
+std::vector<Register> registers() {
+  using O = OtgFs;
+  std::vector<Register> map = {
+      {O::gahbcfg, "OTG_FS_GAHBCFG", 0, 0x181, 0x181},
+      {O::gusbcfg, "OTG_FS_GUSBCFG", 0x00000A00, 0xE0003FC7, 0xE0003FC7},
+      {O::grstctl, "OTG_FS_GRSTCTL", 0x80000000, 0x800007F7, 0},
+      {O::gintsts, "OTG_FS_GINTSTS", 0x04000020, 0xF73CFCFF, 0},
+      {O::gintmsk, "OTG_FS_GINTMSK", 0, 0xF73EFCFE, 0xF73EFCFE},
+      {O::grxstsr, "OTG_FS_GRXSTSR", 0, 0x01FFFFFF, 0},
+      {O::grxstsp, "OTG_FS_GRXSTSP", 0, 0x01FFFFFF, 0},
+      {O::grxfsiz, "OTG_FS_GRXFSIZ", 0x200, 0xFFFF, 0xFFFF},
+      {O::dieptxf0, "OTG_FS_DIEPTXF0", 0x02000200, 0xFFFFFFFF, 0xFFFFFFFF},
+      {O::gccfg, "OTG_FS_GCCFG", 0, 0x003D0000, 0x003D0000},
+      {O::cid, "OTG_FS_CID", 0x00001100, 0xFFFFFFFF, 0xFFFFFFFF},
+      {O::dieptxf1, "OTG_FS_DIEPTXF1", 0x02000400, 0xFFFFFFFF, 0xFFFFFFFF},
+      {O::dieptxf1 + 4, "OTG_FS_DIEPTXF2", 0x02000400, 0xFFFFFFFF, 0xFFFFFFFF},
+      {O::dieptxf1 + 8, "OTG_FS_DIEPTXF3", 0x02000400, 0xFFFFFFFF, 0xFFFFFFFF},
+      {O::dcfg, "OTG_FS_DCFG", 0x02200000, 0x1FF7, 0x1FF7},
+      {O::dctl, "OTG_FS_DCTL", 0, 0xFFF, 0x873},
+      {O::dsts, "OTG_FS_DSTS", 0x10, 0x003FFF1F, 0},
+      {O::diepmsk, "OTG_FS_DIEPMSK", 0, 0x7B, 0x7B},
+      {O::doepmsk, "OTG_FS_DOEPMSK", 0, 0x1B, 0x1B},
+      {O::daint, "OTG_FS_DAINT", 0, 0x000F000F, 0},
+      {O::daintmsk, "OTG_FS_DAINTMSK", 0, 0x000F000F, 0x000F000F},
+      {O::diepempmsk, "OTG_FS_DIEPEMPMSK", 0, 0xF, 0xF},
+      {O::pcgcctl, "OTG_FS_PCGCCTL", 0, 0x13, 0x3},
+  };
+  for (std::uint32_t n = 0; n < O::endpoints; ++n) {
+    const std::uint32_t in = O::in_base + 0x20 * n, out = O::out_base + 0x20 * n;
+    map.push_back({in, "OTG_FS_DIEPCTL", n ? 0 : usbaep, n ? 0xFFEF87FF : 0xCFEE8003, n ? 0x03EC87FFu : 0x03E00003u});
+    map.push_back({in + 8, "OTG_FS_DIEPINT", 0x80, 0xDB, 0});
+    map.push_back({in + 0x10, "OTG_FS_DIEPTSIZ", 0, n ? 0x7FFFFFFF : 0x0018007Fu, n ? 0x7FFFFFFF : 0x0018007Fu});
+    map.push_back({in + 0x18, "OTG_FS_DTXFSTS", 0, 0xFFFF, 0});
+    map.push_back({out, "OTG_FS_DOEPCTL", n ? 0 : usbaep, n ? 0xFC3F87FF : 0xCC3E8003, n ? 0x003C87FFu : 0x00300000u});
+    map.push_back({out + 8, "OTG_FS_DOEPINT", 0x80, 0xDB, 0});
+    map.push_back({out + 0x10, "OTG_FS_DOEPTSIZ", 0, n ? 0x7FFFFFFF : 0x6008007Fu, n ? 0x7FFFFFFF : 0x6008007Fu});
+    map.push_back({O::fifo_base + 0x1000 * n, "OTG_FS FIFO", 0, 0xFFFFFFFF, 0});
+  }
+  return map;
+}
+
+std::string endpoint(bool in, int n) {
+  return std::string(in ? "IN" : "OUT") + " endpoint " + std::to_string(n) + ": ";
+}
+
+}  // namespace
+
+OtgFs::OtgFs(Host& host, Links links)
+    : Device(host, "OTG_FS", address, registers(), 0x34, 7), links_(std::move(links)) {}
+
+void OtgFs::reset() {
+  Device::reset();
+  core_reset();
+  forced_at_ = 0;
+  update();
+}
+
+/// What CSRST forgets: everything but GCCFG, PCGCCTL and the speed (34.16.2).
+void OtgFs::core_reset() {
+  pulled_up_ = enumerated_ = suspended_ = setup_open_ = setup_fresh_ = false;
+  answers_to_ = 0;
+  reset_ends_ = idle_since_ = never;
+  in_ = {};
+  rx_.clear();
+  open_ = {};
+  read_at_ = 0;
+}
+
+std::uint32_t OtgFs::packet_size(bool in, int n) const {
+  if (n == 0) return 64u >> (peek(in_base) & 3);  // OUT 0 follows IN 0
+  return peek(control(in, n)) & 0x7FF;
+}
+
+std::uint32_t OtgFs::tx_depth(int n) const {
+  return peek(n == 0 ? dieptxf0 : dieptxf1 + 4 * static_cast<std::uint32_t>(n - 1)) >> 16;
+}
+
+std::uint32_t OtgFs::rx_used() const {
+  std::uint32_t words = static_cast<std::uint32_t>((open_.bytes.size() - read_at_ + 3) / 4);
+  for (const Received& r : rx_) words += 1 + static_cast<std::uint32_t>((r.bytes.size() + 3) / 4);
+  return words;
+}
+
+// ---- what the firmware sees -----------------------------------------------------------------------------------------
+
+std::uint32_t OtgFs::endpoint_interrupts() const {
+  std::uint32_t any = 0;
+  for (int n = 0; n < endpoints; ++n) {
+    const std::uint32_t in = peek(control(true, n) + 8), out = peek(control(false, n) + 8);
+    const bool empty = (in & bit(7)) && (peek(diepempmsk) >> n & 1);
+    if ((in & peek(diepmsk) & 0x7Bu) || empty) any |= bit(n);
+    if (out & peek(doepmsk)) any |= bit(16 + n);
+  }
+  return any;
+}
+
+std::uint32_t OtgFs::interrupts() const {
+  const std::uint32_t wanted = endpoint_interrupts() & peek(daintmsk);
+  return peek(gintsts) | (rx_.empty() ? 0 : rxflvl) | (wanted & 0xFFFF ? iepint : 0) | (wanted >> 16 ? oepint : 0);
+}
+
+void OtgFs::update() {
+  host_.set_line(irq, (peek(gahbcfg) & 1) && (interrupts() & peek(gintmsk)));
+  host_.reschedule();
+}
+
+std::uint32_t OtgFs::on_read(std::uint32_t offset) {
+  if (offset >= fifo_base) return pop_word(offset);
+  switch (offset) {
+    case grstctl:
+      return bit(31) | (host_.now() < core_reset_ends_ ? 1u : 0u);
+    case gintsts:
+      return interrupts();
+    case grxstsr:
+      return rx_.empty() ? 0 : rx_.front().status;
+    case grxstsp:
+      return pop_status();
+    case daint:
+      return endpoint_interrupts();
+    default:
+      if (offset >= in_base && offset < in_base + 0x80 && (offset & 0x1F) == 0x18) {
+        const auto n = static_cast<int>((offset - in_base) / 0x20);
+        const auto used = static_cast<std::uint32_t>(in_[static_cast<std::size_t>(n)].fifo.size());
+        return tx_depth(n) - std::min(tx_depth(n), used);
+      }
+      return peek(offset);
+  }
+}
+
+std::uint32_t OtgFs::pop_status() {
+  if (rx_.empty()) {
+    trouble("GRXSTSP read while the RX FIFO is empty", grxstsp);
+    return 0;
+  }
+  if (read_at_ < open_.bytes.size()) trouble("a packet was left half read in the RX FIFO", grxstsp);
+  open_ = std::move(rx_.front());
+  rx_.pop_front();
+  read_at_ = 0;
+  const auto n = static_cast<int>(open_.status & 0xF);
+  switch (field(open_.status, 17, 4)) {
+    case out_nak:
+      at(gintsts) |= gonakeff;
+      break;
+    case setup_done:
+      flags(false, 0) |= stup;
+      at(control(false, 0)) &= ~epena;
+      break;
+    case out_done:
+      flags(false, n) |= xfrc;
+      at(control(false, n)) &= ~epena;
+      break;
+    default:
+      break;
+  }
+  update();
+  return open_.status;
+}
+
+std::uint32_t OtgFs::pop_word(std::uint32_t offset) {
+  if (read_at_ >= open_.bytes.size()) {
+    trouble("RX FIFO read beyond the packet", offset);
+    return 0;
+  }
+  std::uint32_t word = 0;
+  for (std::size_t i = 0; i < 4 && read_at_ + i < open_.bytes.size(); ++i)
+    word |= static_cast<std::uint32_t>(open_.bytes[read_at_ + i]) << 8 * i;
+  read_at_ += 4;
+  return word;
+}
+
+void OtgFs::on_write(std::uint32_t offset, std::uint32_t value) {
+  if (std::abs(links_.usb_Hz() - 48e6) > 120e3) trouble("its 48 MHz clock is missing (PLLQ)", offset);
+  if (host_.now() < core_reset_ends_) trouble("written while the core soft reset still runs", offset);
+  if (offset != pcgcctl && (peek(pcgcctl) & 3)) trouble("written while PCGCCTL stops its clocks", offset);
+  if (offset >= fifo_base) {
+    push(static_cast<int>((offset - fifo_base) / 0x1000), value);
+  } else if (offset >= in_base && offset < out_base + 0x80) {
+    const bool in = offset < out_base;
+    const auto n = static_cast<int>((offset & 0x7F) / 0x20);
+    switch (offset & 0x1F) {
+      case 0:
+        write_control(in, n, value);
+        break;
+      case 8:
+        at(offset) &= ~(value & 0x5B);  // TXFE is a level
+        break;
+      case 0x10:
+        if (peek(control(in, n)) & epena)
+          trouble(endpoint(in, n) + "size written while its transfer is enabled", offset);
+        keep(offset, value);
+        break;
+      default:
+        trouble("write to a read-only register", offset);
+    }
+  } else {
+    switch (offset) {
+      case grstctl:
+        write_reset_register(value);
+        break;
+      case gintsts:
+        at(gintsts) &= ~(value & cleared_by_one);
+        break;
+      case gusbcfg:
+        if ((value & bit(30)) && !(peek(gusbcfg) & bit(30))) forced_at_ = host_.now();
+        keep(offset, value);
+        break;
+      case gccfg:
+        keep(offset, value);
+        check_attach();
+        break;
+      case dctl:
+        write_dctl(value);
+        break;
+      case dcfg:
+        if (((value ^ peek(dcfg)) & 0x7F0) && (value & 0x7F0) && !setup_open_)
+          trouble("device address written outside SET_ADDRESS: it belongs between SETUP and status stage", offset);
+        if (!(value & 0x7F0)) answers_to_ = 0;
+        keep(offset, value);
+        break;
+      default:
+        keep(offset, value);
+        break;
+    }
+  }
+  update();
+}
+
+void OtgFs::write_reset_register(std::uint32_t value) {
+  if (value & 1) {
+    const std::uint32_t kept[] = {peek(gccfg), peek(pcgcctl), peek(dcfg) & 3};
+    Device::reset();
+    core_reset();
+    at(gccfg) = kept[0];
+    at(pcgcctl) = kept[1];
+    at(dcfg) |= kept[2];
+    core_reset_ends_ = host_.now() + core_reset_time;
+  }
+  if (value & bit(4)) {
+    rx_.clear();
+    open_ = {};
+    read_at_ = 0;
+  }
+  if (!(value & bit(5))) return;
+  for (int n = 0; n < endpoints; ++n) {
+    if (field(value, 6, 5) != 0x10 && field(value, 6, 5) != static_cast<std::uint32_t>(n)) continue;
+    const std::uint32_t c = peek(control(true, n));
+    if ((c & epena) && !(c & naksts))
+      trouble(endpoint(true, n) + "TX FIFO flushed while the core may be sending from it", grstctl);
+    in_[static_cast<std::size_t>(n)].fifo.clear();
+  }
+}
+
+void OtgFs::write_dctl(std::uint32_t value) {
+  keep(dctl, value);
+  if (value & bit(7)) at(gintsts) |= ginakeff;
+  if (value & bit(8)) at(gintsts) &= ~ginakeff;
+  if (value & bit(9)) rx_.push_back({static_cast<std::uint32_t>(out_nak) << 17});
+  if (value & bit(10)) at(gintsts) &= ~gonakeff;
+  check_attach();
+}
+
+/// The pull-up on D+ follows PWRDWN (which means powered) and soft disconnect.
+void OtgFs::check_attach() {
+  const bool up = (peek(gccfg) & bit(16)) && !(peek(dctl) & bit(1));
+  if (up && !pulled_up_) {
+    if (!(peek(gccfg) & bit(21))) trouble("VBUS is sensed on PA9, which is TIM1's (NOVBUSSENS is 0)", gccfg);
+    if (!links_.pins()) trouble("attached, but PA11 and PA12 are not OTG_FS's (AF10)", gccfg);
+    if ((peek(dcfg) & 3) != 3) trouble("attached with DSPD other than full speed on the internal PHY", dcfg);
+    if (!(peek(gusbcfg) & bit(30)) || host_.now() < forced_at_ + force_time)
+      trouble("attached before device mode was forced for 25 ms (FDMOD)", gusbcfg);
+    if (field(peek(gusbcfg), 10, 4) != 6) trouble("TRDT is not 6, as AHB clocks above 32 MHz need", gusbcfg);
+    idle_since_ = host_.now();
+  }
+  if (!up) {
+    enumerated_ = false;
+    idle_since_ = never;
+  }
+  pulled_up_ = up;
+}
+
+// ---- endpoints ------------------------------------------------------------------------------------------------------
+
+void OtgFs::write_control(bool in, int n, std::uint32_t value) {
+  const std::uint32_t where = control(in, n);
+  const bool was_enabled = peek(where) & epena;
+  if (!in && n == 0 && (value & epdis)) trouble("OUT endpoint 0 can't be disabled", where);
+  keep(where, value);
+  if (n == 0) at(where) |= usbaep;
+  if (value & sd0pid && n) at(where) &= ~dpid;
+  if (value & sd1pid && n) at(where) |= dpid;
+  if (value & snak) {
+    at(where) |= naksts;
+    if (in) flags(true, n) |= inepne;
+  }
+  if (value & cnak) at(where) &= ~naksts;
+  if ((value & epdis) && !(value & epena && !was_enabled)) {
+    if (!was_enabled) {
+      trouble(endpoint(in, n) + "EPDIS while it is not enabled", where);
+    } else if (!(peek(where) & naksts)) {
+      trouble(endpoint(in, n) + "EPDIS without SNAK before it", where);
+    } else if (!in && !(peek(gintsts) & gonakeff)) {
+      trouble(endpoint(in, n) + "EPDIS without the global OUT NAK in effect", where);
+    } else {
+      at(where) &= ~epena;
+      flags(in, n) |= epdisd;
+    }
+  } else if (value & epena) {
+    if (!was_enabled)
+      enable(in, n, value);
+    else if (value & (cnak | sd0pid))
+      trouble(endpoint(in, n) + "enabled again before its transfer ended", where);
+  }
+}
+
+void OtgFs::enable(bool in, int n, std::uint32_t value) {
+  const std::uint32_t where = control(in, n);
+  const std::uint32_t size = peek(where + 0x10), bytes = size & (n ? 0x7FFFFu : 0x7Fu);
+  const std::uint32_t packets = field(size, 19, n ? 10 : in ? 2 : 1), largest = packet_size(in, n);
+  if (!active(in, n)) trouble(endpoint(in, n) + "enabled without USBAEP", where);
+  if (largest == 0 || largest > 64) trouble(endpoint(in, n) + "a full-speed packet holds 1 to 64 bytes", where);
+  if (peek(where) & naksts) trouble(endpoint(in, n) + "EPENA while NAK stays set: it would never answer", where);
+  if (packets == 0) trouble(endpoint(in, n) + "enabled for no packet", where);
+  if (in ? bytes > packets * largest : bytes != packets * largest)
+    trouble(endpoint(in, n) + "transfer size and packet count do not fit each other", where);
+  at(where) |= epena;
+  if (!in) return;
+  if (field(value, 22, 4) != static_cast<std::uint32_t>(n))
+    trouble(endpoint(in, n) + "TXFNUM names another endpoint's FIFO", where);
+  check_fifos(n, where);
+  In& side = in_[static_cast<std::size_t>(n)];
+  if (!side.fifo.empty()) trouble(endpoint(in, n) + "enabled with old data in its TX FIFO", where);
+  side.words = (bytes + 3) / 4;
+}
+
+/// The FIFOs that are in use lie in the 320 words and do not overlap (34.11).
+void OtgFs::check_fifos(int n, std::uint32_t offset) {
+  const auto span = [&](int k) {
+    const std::uint32_t v = peek(k == 0 ? dieptxf0 : dieptxf1 + 4 * static_cast<std::uint32_t>(k - 1));
+    return std::pair(v & 0xFFFF, (v & 0xFFFF) + (v >> 16));
+  };
+  const auto mine = span(n);
+  if (mine.second - mine.first < 16 || (mine.second - mine.first) * 4 < packet_size(true, n))
+    trouble(endpoint(true, n) + "its TX FIFO is smaller than 16 words or than its packets", offset);
+  if (mine.second > fifo_words) trouble(endpoint(true, n) + "its TX FIFO lies beyond the 320 words", offset);
+  if (mine.first < peek(grxfsiz)) trouble(endpoint(true, n) + "its TX FIFO lies in the RX FIFO", offset);
+  for (int k = 0; k < endpoints; ++k) {
+    const auto other = span(k);
+    if (k != n && active(true, k) && mine.first < other.second && other.first < mine.second)
+      trouble(endpoint(true, n) + "its TX FIFO overlaps that of endpoint " + std::to_string(k), offset);
+  }
+}
+
+void OtgFs::push(int n, std::uint32_t word) {
+  In& side = in_[static_cast<std::size_t>(n)];
+  const std::uint32_t where = fifo_base + 0x1000 * static_cast<std::uint32_t>(n);
+  if (!(peek(control(true, n)) & epena)) return trouble(endpoint(true, n) + "FIFO written while not enabled", where);
+  if (side.words == 0) return trouble(endpoint(true, n) + "more data than DIEPTSIZ announced", where);
+  if (side.fifo.size() >= tx_depth(n)) return trouble(endpoint(true, n) + "TX FIFO overrun", where);
+  side.fifo.push_back(word);
+  --side.words;
+}
+
+// ---- the host's end of the cable ------------------------------------------------------------------------------------
+
+Time OtgFs::next_event() const {
+  const Time idle = pulled_up_ && !suspended_ && idle_since_ != never ? idle_since_ + idle_time : never;
+  return std::min({reset_ends_, plugged_ && awake_ ? next_sof_ : never, idle});
+}
+
+void OtgFs::advance(Time now) {
+  if (reset_ends_ <= now) {
+    reset_ends_ = never;
+    enumerated_ = true;
+    at(gintsts) |= enumdne;
+    at(dsts) = (peek(dsts) & ~7u) | 3u << 1;  // full speed
+    idle_since_ = now;
+    awake_ = true;
+    next_sof_ = now + frame_time;
+  }
+  if (plugged_ && awake_ && next_sof_ <= now) {
+    next_sof_ += frame_time;
+    idle_since_ = pulled_up_ ? now : never;
+    if (enumerated_) {
+      at(dsts) = (peek(dsts) & ~0x003FFF00u) | ((field(peek(dsts), 8, 14) + 1) & 0x7FF) << 8;
+      at(gintsts) |= sof;
+    }
+  }
+  if (pulled_up_ && !suspended_ && idle_since_ != never && idle_since_ + idle_time <= now) {
+    suspended_ = true;
+    at(gintsts) |= esusp | usbsusp;
+    at(dsts) |= 1;
+  }
+  update();
+}
+
+void OtgFs::plug() {
+  plugged_ = true;
+  awake_ = false;
+}
+
+void OtgFs::unplug() {
+  plugged_ = awake_ = enumerated_ = false;
+  reset_ends_ = never;
+}
+
+void OtgFs::bus_reset() {
+  if (!attached()) return;
+  at(gintsts) |= usbrst;
+  at(dsts) &= ~1u;
+  suspended_ = enumerated_ = setup_open_ = setup_fresh_ = false;
+  answers_to_ = field(peek(dcfg), 4, 7);  // the core forgets no address; the firmware has to
+  for (int n = 1; n < endpoints; ++n) {
+    at(control(true, n)) &= ~usbaep;
+    at(control(false, n)) &= ~usbaep;
+  }
+  reset_ends_ = host_.now() + reset_time;
+  idle_since_ = never;
+  awake_ = false;
+  update();
+}
+
+void OtgFs::suspend() { awake_ = false; }
+
+void OtgFs::resume() {
+  awake_ = true;
+  next_sof_ = host_.now() + frame_time;
+  idle_since_ = pulled_up_ ? host_.now() : never;
+  if (suspended_ && attached()) {
+    suspended_ = false;
+    at(gintsts) |= wkupint;
+    at(dsts) &= ~1u;
+  }
+  update();
+}
+
+bool OtgFs::hears(unsigned device) const { return ready() && !suspended_ && device == answers_to_; }
+
+/// The first token after a SETUP: the core tells that no further SETUP came.
+void OtgFs::token_after_setup() {
+  if (!setup_fresh_) return;
+  rx_.push_back({static_cast<std::uint32_t>(setup_done) << 17});
+  setup_fresh_ = false;
+}
+
+UsbAnswer OtgFs::setup(unsigned device, const std::array<std::uint8_t, 8>& request) {
+  if (!hears(device)) return {};
+  std::uint32_t& size = at(out_base + 0x10);
+  if (field(size, 29, 2) == 0)
+    trouble("a SETUP arrived while STUPCNT was 0", out_base + 0x10);
+  else
+    size -= 1u << 29;
+  if (rx_used() + 4 > peek(grxfsiz)) {
+    trouble("RX FIFO too full for a SETUP", grxfsiz);
+    return {};
+  }
+  rx_.push_back({static_cast<std::uint32_t>(setup_data) << 17 | 8 << 4, {request.begin(), request.end()}});
+  for (const bool in : {true, false}) at(control(in, 0)) = (peek(control(in, 0)) | naksts) & ~stall_bit;
+  setup_open_ = setup_fresh_ = true;
+  update();
+  return {UsbAnswer::ack};
+}
+
+UsbAnswer OtgFs::out(unsigned device, int n, bool data1, const std::uint8_t* bytes, std::size_t count) {
+  if (!hears(device) || n >= endpoints || !active(false, n) || count > packet_size(false, n)) return {};
+  if (n == 0) token_after_setup();
+  const std::uint32_t where = control(false, n);
+  std::uint32_t& c = at(where);
+  std::uint32_t& size = at(where + 0x10);
+  UsbAnswer answer{UsbAnswer::nak};
+  const auto words = 1 + static_cast<std::uint32_t>((count + 3) / 4);
+  if (c & stall_bit) {
+    answer.kind = UsbAnswer::stall;
+  } else if (!(c & epena) || (c & naksts) || (peek(gintsts) & gonakeff)) {
+    if (!(c & epena)) flags(false, n) |= otepdis;
+  } else if (n && data1 != ((c & dpid) != 0)) {
+    answer.kind = UsbAnswer::ack;  // taken for a repetition and thrown away, USB 2.0 8.6.4
+  } else if (rx_used() + words + 1 + setup_words <= peek(grxfsiz)) {
+    if (count > (size & (n ? 0x7FFFFu : 0x7Fu))) trouble(endpoint(false, n) + "packet longer than DOEPTSIZ", where);
+    const std::uint32_t pid = data1 ? 2u << 15 : 0;
+    rx_.push_back({static_cast<std::uint32_t>(out_data) << 17 | pid | static_cast<std::uint32_t>(count) << 4 |
+                       static_cast<std::uint32_t>(n),
+                   {bytes, bytes + count}});
+    size -= static_cast<std::uint32_t>(count) + (1u << 19);
+    if (n) c ^= dpid;
+    if (field(size, 19, n ? 10 : 1) == 0 || count < packet_size(false, n)) {
+      rx_.push_back({static_cast<std::uint32_t>(out_done) << 17 | static_cast<std::uint32_t>(n)});
+      c |= naksts;
+    }
+    answer.kind = UsbAnswer::ack;
+  }
+  update();
+  return answer;
+}
+
+UsbAnswer OtgFs::in(unsigned device, int n) {
+  if (!hears(device) || n >= endpoints || !active(true, n)) return {};
+  if (n == 0) token_after_setup();
+  const std::uint32_t where = control(true, n);
+  std::uint32_t& c = at(where);
+  std::uint32_t& size = at(where + 0x10);
+  In& side = in_[static_cast<std::size_t>(n)];
+  const std::uint32_t count = std::min(packet_size(true, n), size & (n ? 0x7FFFFu : 0x7Fu));
+  UsbAnswer answer{UsbAnswer::nak};
+  if (c & stall_bit) {
+    answer.kind = UsbAnswer::stall;
+  } else if ((c & naksts) || !(c & epena) || side.fifo.size() * 4 < count) {
+    if (!(c & naksts)) flags(true, n) |= ittxfe;
+  } else {
+    answer = {UsbAnswer::ack, (c & dpid) != 0, std::vector<std::uint8_t>(count)};
+    for (std::uint32_t i = 0; i < count; i += 4) {
+      for (std::uint32_t k = 0; k < 4 && i + k < count; ++k)
+        answer.bytes[i + k] = static_cast<std::uint8_t>(side.fifo.front() >> 8 * k);
+      side.fifo.pop_front();
+    }
+    size -= count + (1u << 19);
+    c ^= n ? dpid : 0;
+    if (field(size, 19, n ? 10 : 2) == 0) {
+      c &= ~epena;
+      flags(true, n) |= xfrc;
+    }
+    if (n == 0 && count == 0) {  // a status stage: SET_ADDRESS takes effect
+      answers_to_ = field(peek(dcfg), 4, 7);
+      setup_open_ = false;
+    }
+  }
+  update();
+  return answer;
+}
+
+}  // namespace host_sim::chip
