@@ -8,6 +8,7 @@
 #include <set>
 
 #include "identify/experiment.hpp"
+#include "identify/gain.hpp"
 #include "identify/model_file.hpp"
 #include "identify/search.hpp"
 
@@ -197,12 +198,16 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
     if (!extended) found.chosen.fit = base;
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
-    if (extended) add_extended(problem, found.chosen.fit, report, 0);
+    if (extended) {
+      add_extended(problem, found.chosen.fit, report, 0);
+      if (report.core_refusal.empty()) report.gain = gain_of(problem, base, found.chosen.fit);
+    }
     report.experiment = experiment(problem, found);
     report.sentence = sentence(found, report);
   }
   score_held_out(whole, motor, held, base, found.chosen.fit, report);
   report.model_toml = heat_set_toml(problem, found.chosen.fit, report.sentence);
+  report.baseline_toml = heat_set_toml(problem, base, "The two-resistor model as fitted, without what was found.");
   return report;
 }
 

@@ -32,7 +32,7 @@ Examples
 
 struct Arguments {
   std::vector<std::string> logs, columns, truths;
-  std::string motor, map, hold_out, json, html, write_model;
+  std::string motor, map, hold_out, json, html, write_model, write_baseline;
   bool explain = false;
 };
 
@@ -126,6 +126,7 @@ int answer(Arguments a) {
     wire::pc::write_whole(a.write_model, report.model_toml);
     report.model_file = a.write_model;
   }
+  if (!a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
   if (!a.html.empty()) wire::pc::write_whole(a.html, as_html(report));
   if (a.json == "-") {
     fmt::print("{}", as_json(report));
@@ -152,6 +153,8 @@ int main(int argc, char** argv) {
   app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
   app.add_option("--html", a.html, "write a page with pictures");
   app.add_option("--write-model", a.write_model, "write the model found as a heat-network parameter set");
+  app.add_option("--write-baseline", a.write_baseline,
+                 "write the two-resistor model as fitted, to compare on the board with what was found");
   app.add_option("--score", a.truths, "truth files, one a log: print how often each answer was right");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning");
   app.footer("Exit codes: 0 an answer was given, 2 usage, 3 the data cannot be used.");

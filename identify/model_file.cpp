@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
+
 #include "thermal/heat_names.hpp"
 
 namespace identify {
@@ -17,22 +20,32 @@ std::string end_name(int end) {
 
 }  // namespace
 
+thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
+  const Model<double> m = model_of(problem, f, 0);
+  thermal::HeatSet<double> set = m.set;
+  for (int i = 0; i < set.node_count; ++i) {
+    const bool winding = i == m.core || i == m.hot_node;
+    set.nodes[i].max_degC =
+        winding ? static_cast<float>(problem.belief.winding_max_degC) : std::numeric_limits<float>::infinity();
+  }
+  return set;
+}
+
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {
   const Model<double> m = model_of(problem, f, 0);
-  const auto& set = m.set;
+  const thermal::HeatSet<double> set = heat_set_of(problem, f);
   std::string s = "# " + sentence + "\n";
   if (!problem.belief.known && !problem.heated_by_power())
     s += "# No motor file was given: gains are per assumed ohm; scale heat and capacities together.\n";
   s += "format = 1\n";
   for (int i = 0; i < set.node_count; ++i) {
-    const bool winding = i == m.core || i == m.hot_node;
     s += fmt::format("\n[[node]]  # {}: {}\ncapacity_J_per_K = {:.6g}\n", i,
                      i == m.core       ? "winding"
                      : i == m.housing  ? "housing"
                      : i == m.hot_node ? "hot spot"
                                        : "further mass",
                      set.nodes[i].capacity_J_per_K);
-    if (winding) s += fmt::format("max_degC = {:g}\n", problem.belief.winding_max_degC);
+    if (std::isfinite(set.nodes[i].max_degC)) s += fmt::format("max_degC = {:g}\n", set.nodes[i].max_degC);
   }
   for (int i = 0; i < set.link_count; ++i) {
     const auto& link = set.links[i];

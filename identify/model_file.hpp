@@ -10,6 +10,9 @@
 
 namespace identify {
 
+/// The set itself, with the winding's limit.
+thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& fit);
+
 /// `sentence`: what was found, written as a comment at the top.
 std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence);
 

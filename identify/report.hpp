@@ -63,10 +63,21 @@ struct Experiment {
   std::string why;
 };
 
+/// What a board would do on a motor like the extended model: before with the two-resistor fit, after with the
+/// extension.
 struct Gain {
-  double overshoot_before_K = 0, overshoot_after_K = 0, burst_s_before = 0, burst_s_after = 0, continuous_A_before = 0,
-         continuous_A_after = 0;
+  double overshoot_before_K = 0, overshoot_after_K = 0;       // of the winding, in a push that outlasts its budget
+  double burst_s_before = 0, burst_s_after = 0;               // that the board promises for the burst, from rest
+  double continuous_A_before = 0, continuous_A_after = 0;     // that it promises for an hour
+  double burst_A = 0, speed_rad_per_s = 0, ambient_degC = 0;  // of that push; amperes as in the log
 };
+
+/// The gain in words, for text and page.
+struct GainLine {
+  std::string what, before, after;
+};
+std::string gain_conditions(const Gain& gain);
+std::vector<GainLine> gain_lines(const Gain& gain);
 
 struct LogPlot {
   std::string name;
@@ -94,7 +105,8 @@ struct Report {
   std::optional<HeldOut> held_out;
   std::optional<Gain> gain;
   std::optional<Experiment> experiment;
-  std::string model_toml;  // the parameter set (--write-model)
+  std::string model_toml;     // the parameter set (--write-model)
+  std::string baseline_toml;  // the two-resistor model as fitted, as a set (--write-baseline)
   std::string model_file;
   std::vector<std::string> reasoning;  // --explain
   std::vector<LogPlot> plots;

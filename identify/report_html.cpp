@@ -174,7 +174,14 @@ std::string as_html(const Report& r) {
     errors("not seen (" + r.held_out->how + ")", r.held_out->before);
     if (!r.causes.empty()) errors("the same, extended model", r.held_out->after);
   }
-  s += "</table>\n<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
+  s += "</table>\n";
+  if (r.gain) {
+    s += "<h2>What it is worth</h2><p>" + escaped(gain_conditions(*r.gain)) + "</p><table>" +
+         row({"", "two resistors", "extended"}, "th");
+    for (const GainLine& line : gain_lines(*r.gain)) s += row({line.what, line.before, line.after});
+    s += "</table>\n";
+  }
+  s += "<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
   for (const Wrong& w : r.structure.wrong) {
     s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") +
                   fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),

@@ -99,7 +99,8 @@ std::string as_json(const Report& r) {
                    {"burst_s_before", number(r.gain->burst_s_before)},
                    {"burst_s_after", number(r.gain->burst_s_after)},
                    {"continuous_A_before", number(r.gain->continuous_A_before)},
-                   {"continuous_A_after", number(r.gain->continuous_A_after)}};
+                   {"continuous_A_after", number(r.gain->continuous_A_after)},
+                   {"how", gain_conditions(*r.gain)}};
   }
   out["experiment"] = nullptr;
   if (r.experiment) {

@@ -27,6 +27,23 @@ std::string rmse(const Rmse& r) {
 
 }  // namespace
 
+std::string gain_conditions(const Gain& g) {
+  return fmt::format(
+      "the board with the two-resistor model and with the extended one, if the motor is as the extended one says; a "
+      "push "
+      "of {:.2f} A from rest at {:.0f} degC, {:.0f} rad/s",
+      g.burst_A, g.ambient_degC, g.speed_rad_per_s);
+}
+
+std::vector<GainLine> gain_lines(const Gain& g) {
+  const auto seconds = [](double s) { return std::isfinite(s) ? fmt::format("{:.1f} s", s) : std::string("no end"); };
+  return {{"the winding passes its limit by", fmt::format("{:.1f} K", g.overshoot_before_K),
+           fmt::format("{:.1f} K", g.overshoot_after_K)},
+          {"the push is promised for", seconds(g.burst_s_before), seconds(g.burst_s_after)},
+          {"for an hour is promised", fmt::format("{:.2f} A", g.continuous_A_before),
+           fmt::format("{:.2f} A", g.continuous_A_after)}};
+}
+
 std::string as_text(const Report& r, bool explain) {
   std::string s = r.sentence + "\n\n";
   s += fmt::format("Verdict: {}      Motor: {}\n", r.verdict, r.motor);
@@ -98,11 +115,9 @@ std::string as_text(const Report& r, bool explain) {
     if (!r.causes.empty()) s += "  after:  " + rmse(r.held_out->after) + "\n";
   }
   if (r.gain) {
-    s += fmt::format(
-        "\nWhat it is worth\n  overshoot of the winding {:.1f} -> {:.1f} K; burst {:.1f} -> {:.1f} s; continuous "
-        "{:.2f} -> {:.2f} A\n",
-        r.gain->overshoot_before_K, r.gain->overshoot_after_K, r.gain->burst_s_before, r.gain->burst_s_after,
-        r.gain->continuous_A_before, r.gain->continuous_A_after);
+    s += "\nWhat it is worth: " + gain_conditions(*r.gain) + "\n";
+    for (const GainLine& line : gain_lines(*r.gain))
+      s += fmt::format("  {:<52} {} -> {}\n", line.what, line.before, line.after);
   }
   if (r.experiment) {
     s += "\nExperiment that would tell\n  " + r.experiment->why + "\n";

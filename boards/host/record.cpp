@@ -22,8 +22,11 @@ constexpr double least_factor = 0.6, largest_factor = 1.8;
 constexpr double least_error_K = 3, largest_error_K = 10;  // of an estimator that does not know the effect
 // Resistance as a thermometer: a reading now and then, when the motor happens to stand still.
 constexpr double ohmmeter_K = 2, ohmmeter_every_s = 30;
-// A motor that is not known yet is kept this far below its limit: a design value of ours, not proven for the worst draw;
-// every recording states how hot the winding really became.
+constexpr double thermocouple_K = 0.2;  // white, of a fine wire with a 16-bit converter
+// Each log begins at rest: the board learns its current sensors' offset, and a person sees what is soaked.
+constexpr double rest_first_s = 10;
+// A motor that is not known yet is kept this far below its limit: a design value of ours, not proven for the worst
+// draw; every recording states how hot the winding really became.
 constexpr double unknown_motor_margin_K = 40;
 
 /// Effects that cannot show on a bench with one loaded motor and this firmware: the offset is learnt away, the other
@@ -49,7 +52,8 @@ Scene scene_of(const RecordOptions& options) {
   return scene;
 }
 
-std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
+std::vector<host_sim::Demand> excitation_of(const RecordOptions& options, const Scene& scene,
+                                            const wire::Motor& sheet) {
   const double length_s = options.minutes * 60, full_speed = host_sim::full_speed_rad_per_s(sheet, scene.supply_V);
   using host_sim::Excitation;
   const std::pair<const char*, Excitation> kinds[] = {
@@ -65,6 +69,13 @@ std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Sce
     demands[i].current_A = demand_A(scene, 0, time_s);
     demands[i].speed_rad_per_s = imposed_speed_rad_per_s(scene.shaft, time_s);
   }
+  return demands;
+}
+
+std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
+  std::vector<host_sim::Demand> demands = excitation_of(options, scene, sheet);
+  for (std::size_t i = 0; i < std::min(demands.size(), static_cast<std::size_t>(rest_first_s * program_Hz)); ++i)
+    demands[i].current_A = demands[i].speed_rad_per_s = 0;
   return demands;
 }
 
@@ -138,15 +149,18 @@ Recording record(const RecordOptions& options) {
   std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation,
                                 file.name, file.surrogate ? " (surrogate)" : "", options.seed);
   csv += fmt::format(
-      "# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n",
-      options.thermocouple ? "thermocouple" : "from winding resistance, +-2 K, every 30 s");
+      "# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n"
+      "# current, speed and bus: means over the interval that begins at time_s\n",
+      options.thermocouple ? "thermocouple, +-0.2 K" : "from winding resistance, +-2 K, every 30 s");
   csv += "time_s,current_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
   double due_s = 0;
-  for (const Row& row : trace.rows) {
-    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, row.current_A,
-                       row.speed_rad_per_s, row.bus_V, row.bus_A, row.housing_degC, row.ambient_degC);
+  for (std::size_t i = 1; i < trace.rows.size(); ++i) {
+    // A row of the trace holds means over the interval that ends with it: they belong to the temperatures before.
+    const Row &row = trace.rows[i - 1], &next = trace.rows[i];
+    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, next.current_A,
+                       next.speed_rad_per_s, next.bus_V, next.bus_A, row.housing_degC, row.ambient_degC);
     if (options.thermocouple)
-      csv += fmt::format("{:.2f}", row.true_winding_degC);
+      csv += fmt::format("{:.2f}", row.true_winding_degC + thermocouple_K * noise.gauss());
     else if (row.time_s >= due_s)
       csv += fmt::format("{:.2f}", row.true_winding_degC + ohmmeter_K * noise.gauss()), due_s += ohmmeter_every_s;
     csv += '\n';

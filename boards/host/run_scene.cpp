@@ -24,6 +24,7 @@ namespace {
 
 constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;  // direct current that heats like a phase amplitude of 1 A
 constexpr double no_limit_degC = 1000;                     // for limiters that must do without the governor
+constexpr double oracle_band_K = 1;                        // within which the oracle's current falls from all to none
 constexpr double restart_K = 10;                           // a cut limiter comes back this far below its limit
 constexpr int setpoint_periods = 20;                       // the robot's computer speaks every millisecond
 constexpr long progress_periods = 20000;                   // a simulated second
@@ -35,7 +36,7 @@ class Wish {
   Wish(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file)
       : scene_(scene), limiter_(limiter), motor_(file.motor) {}
 
-  double amperes(double demand_A, double estimated_core_degC, const hal::Temperature& housing) {
+  double amperes(double demand_A, double estimated_core_degC, double true_core_degC, const hal::Temperature& housing) {
     switch (limiter_) {
       case Limiter::governor:
         return demand_A;
@@ -45,6 +46,8 @@ class Wish {
         return cut(housing.value_degC, scene_.housing_limit_degC) ? 0 : demand_A;
       case Limiter::hard_cut:
         return cut(estimated_core_degC, motor_.winding_max_degC) ? 0 : demand_A;
+      case Limiter::oracle:
+        return demand_A * std::clamp((motor_.winding_max_degC - true_core_degC) / oracle_band_K, 0.0, 1.0);
     }
     return 0;
   }
@@ -224,7 +227,8 @@ void Board::arm(int axis) {
 void Board::speak(const Trace& trace, Wish& wish, double time_s) {
   firmware::Axis& axis = driver_.axis(trace.axis);
   const hal::Temperature housing = slow_sample(bench_.raw(trace.axis), design_.sensors).housing;
-  const double wish_A = wish.amperes(demand_A(scene_, trace.axis, time_s), hottest_degC(axis.state()), housing);
+  const double wish_A = wish.amperes(demand_A(scene_, trace.axis, time_s), hottest_degC(axis.state()),
+                                     bench_.truth(trace.axis).hottest_degC, housing);
   (void)axis.set_current({0.0f, static_cast<float>(wish_A)});  // a refused setpoint shows in the trace as old
 }
 

@@ -24,7 +24,8 @@ using wire::pc::did_you_mean;
 constexpr std::pair<const char*, Limiter> limiter_names[] = {{"governor", Limiter::governor},
                                                              {"rated", Limiter::rated},
                                                              {"housing", Limiter::housing},
-                                                             {"hard_cut", Limiter::hard_cut}};
+                                                             {"hard_cut", Limiter::hard_cut},
+                                                             {"oracle", Limiter::oracle}};
 
 /// Where a key of a table goes: a text, or a number with the range it must lie in.
 struct Number {
@@ -148,7 +149,7 @@ struct Reader {
       const auto found = std::find_if(std::begin(limiter_names), std::end(limiter_names),
                                       [&](const auto& entry) { return wanted == entry.first; });
       if (found == std::end(limiter_names)) {
-        refuse(fmt::format("{}: limiter '{}' is not one of governor, rated, housing, hard_cut.", path, wanted));
+        refuse(fmt::format("{}: limiter '{}' is not one of governor, rated, housing, hard_cut, oracle.", path, wanted));
       }
       scene.limiters.push_back(found->second);
     }

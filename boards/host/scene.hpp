@@ -14,6 +14,7 @@ enum class Limiter {
   rated,     // a naive current limit at the catalogue rating
   housing,   // full current until the housing sensor reaches its limit
   hard_cut,  // the paper's: full current until the estimated winding temperature reaches the limit, then none
+  oracle,    // what no firmware can: full current until the true winding is at the limit, then what holds it there
 };
 const char* name_of(Limiter limiter);
 

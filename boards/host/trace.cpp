@@ -52,6 +52,8 @@ std::string label(const Result& result, const Trace& trace) {
       return fmt::format("housing limit {:g} °C", result.scene.housing_limit_degC);
     case Limiter::hard_cut:
       return "paper's hard cut";
+    case Limiter::oracle:
+      return "oracle (true temperature)";
   }
   return "";
 }

@@ -62,6 +62,32 @@ TEST(Report, JsonHoldsTheFieldsOfTheContract) {
     EXPECT_TRUE(j["held_out"].contains(key)) << key;
 }
 
+TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
+  const identify::Report report = report_of(options);
+  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  ASSERT_TRUE(report.gain);
+  EXPECT_LT(report.gain->overshoot_after_K, 0.5) << "the model that is the motor keeps its limit";
+  EXPECT_GT(report.gain->burst_s_after, 0);
+  EXPECT_NE(report.gain->continuous_A_before, report.gain->continuous_A_after);
+  const json gain = json::parse(identify::as_json(report)).at("gain");
+  for (const char* key : {"overshoot_before_K", "overshoot_after_K", "burst_s_before", "burst_s_after",
+                          "continuous_A_before", "continuous_A_after"})
+    EXPECT_TRUE(gain.at(key).is_number()) << key;
+  EXPECT_NE(identify::as_text(report, false).find("What it is worth"), std::string::npos);
+  EXPECT_NE(identify::as_html(report).find("What it is worth"), std::string::npos);
+}
+
+TEST(Report, WhatIsAdequateHasNothingToGain) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  const identify::Report report = report_of(options);
+  EXPECT_EQ(report.verdict, "adequate");
+  EXPECT_FALSE(report.gain);
+}
+
 TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
   tests::BenchOptions options;
   options.core_every_s = 20;

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+#include "identify/gain.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "identify/model_file.hpp"
+#include "thermal/look_ahead.hpp"
+#include "thermal/validate.hpp"
+
+namespace identify {
+namespace {
+
+using thermal::Boundary, thermal::CoreEstimator, thermal::Drive, thermal::estimator_dt_s;
+using Network = thermal::HeatNetwork<double>;
+
+constexpr thermal::PhaseShares turning{{0.5f, 0.5f, 0.5f}};
+// A burst is asked at three times what the motor carries for an hour: an ordinary overload, whatever the motor's size.
+constexpr double burst_over_continuous = 3;
+constexpr double longest_push_s = 600, hour_s = 3600;
+
+/// How this motor is usually run: mean speed features under load, mean temperatures around it.
+thermal::HeatInput<> working_point(const Problem& problem) {
+  thermal::HeatInput<> sum, around;
+  double loaded = 0, bins = 0;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) {
+      for (int b = 0; b < thermal::boundary_count; ++b) around.boundary_degC[b] += bin.input.boundary_degC[b];
+      ++bins;
+      if (!(bin.input[Drive::current_A2] > 0.01 * problem.rms_A * problem.rms_A)) continue;
+      for (int d = 0; d < thermal::drive_count; ++d) sum.drive[d] += bin.input.drive[d];
+      ++loaded;
+    }
+  }
+  for (double& d : sum.drive) d /= std::max(loaded, 1.0);
+  for (int b = 0; b < thermal::boundary_count; ++b)
+    sum.boundary_degC[b] = around.boundary_degC[b] / std::max(bins, 1.0);
+  sum[Drive::one] = 1;
+  sum[Drive::power_W] = 0;
+  return sum;
+}
+
+/// The working point at a current that turns with the rotor; none at all and no speed: rest.
+thermal::HeatInput<> under(thermal::HeatInput<> input, double amplitude_A) {
+  const double square = amplitude_A * amplitude_A;
+  for (const Drive phase : {Drive::phase_a_A2, Drive::phase_b_A2, Drive::phase_c_A2}) input[phase] = 0.5 * square;
+  input[Drive::current_A2] = square;
+  input[Drive::current_A] = amplitude_A;
+  input[Drive::current2_speed2] = square * input[Drive::speed2_rad2_per_s2];
+  input[Drive::current_speed] = amplitude_A * input[Drive::speed_rad_per_s];
+  return input;
+}
+
+thermal::HeatInput<> resting(thermal::HeatInput<> input) {
+  std::fill(std::begin(input.drive), std::end(input.drive), 0.0);
+  input[Drive::one] = 1;
+  return input;
+}
+
+/// The motor: the set taken for true, and what its housing sensor says.
+class Plant {
+ public:
+  Plant(const thermal::HeatSet<double>& set, const thermal::HeatInput<>& rest)
+      : set_(set), network_(set), step_(network_.transition(estimator_dt_s)) {
+    degC_ = Network::Vector::Constant(set.node_count, rest[Boundary::ambient]);
+    const auto long_step = network_.transition(20.0);
+    for (int i = 0; i < 3000; ++i) degC_ = network_.step(long_step, degC_, rest);  // 17 h: at rest with all around it
+    sensed_degC_ = seen();
+  }
+  void advance(const thermal::HeatInput<>& input) {
+    degC_ = network_.step(step_, degC_, input);
+    const double lag_s = set_.housing.lag_s;
+    sensed_degC_ += (seen() - sensed_degC_) * (lag_s > 0 ? 1 - std::exp(-estimator_dt_s / lag_s) : 1);
+  }
+  double over_limit_K() const {
+    double most = -1e300;
+    for (int i = 0; i < set_.node_count; ++i)
+      most = std::max(most, degC_[i] - static_cast<double>(set_.nodes[i].max_degC));
+    return most;
+  }
+  thermal::Reading housing() const { return {static_cast<float>(sensed_degC_), true}; }
+
+ private:
+  double seen() const {
+    const double T = degC_[set_.housing.node];
+    return T + set_.housing.offset_K + set_.housing.gain_error * (T - 25);
+  }
+  const thermal::HeatSet<double>& set_;
+  Network network_;
+  thermal::Transition<double> step_;
+  Network::Vector degC_;
+  double sensed_degC_ = 0;
+};
+
+struct Answers {
+  double continuous_A, burst_s, overshoot_K;  // amplitude
+};
+
+/// What a board that runs `believed` says and does. `burst_A` 0: not asked yet.
+Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::HeatSet<double>& truth,
+                   const thermal::HeatInput<>& work, double most_A, double burst_A) {
+  thermal::EstimatorSettings settings;
+  settings.trust = thermal::identified_trust;
+  Plant plant(truth, resting(work));
+  CoreEstimator core(believed, settings);
+  const thermal::Reading ambient{static_cast<float>(work[Boundary::ambient]), true};
+  // A second at rest: the board has heard its sensors.
+  for (int i = 0; i < 100; ++i) core.tick(resting(work), plant.housing(), ambient);
+  core.tick(under(work, 0), plant.housing(), ambient);
+  const thermal::LookAhead look(core.network());
+  Answers out{};
+  // Found to a thousandth of the most that is asked about: once to know where, once more closely.
+  const auto for_an_hour_A = [&](double most) {
+    return static_cast<double>(look.current_for_A(core, static_cast<float>(hour_s), static_cast<float>(most), turning));
+  };
+  out.continuous_A = for_an_hour_A(2 * for_an_hour_A(most_A));
+  if (burst_A <= 0) return out;
+  out.burst_s = static_cast<double>(look.seconds_left(core, static_cast<float>(burst_A), turning));
+
+  thermal::GovernorSettings limits;
+  limits.max_A = static_cast<float>(burst_A);
+  thermal::Governor governor(limits);
+  const double push_s = std::min(longest_push_s, std::isfinite(out.burst_s) ? 3 * out.burst_s + 30 : longest_push_s);
+  out.overshoot_K = 0;
+  double allowed_A = static_cast<double>(governor.tick(core).current_A);
+  for (double t_s = 0; t_s < push_s; t_s += estimator_dt_s) {
+    const auto input = under(work, std::min(allowed_A, burst_A));
+    plant.advance(input);
+    core.tick(input, plant.housing(), ambient);
+    allowed_A = static_cast<double>(governor.tick(core).current_A);
+    out.overshoot_K = std::max(out.overshoot_K, plant.over_limit_K());
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const Fit& extended) {
+  if (problem.heated_by_power()) return std::nullopt;
+  const auto before_set = heat_set_of(problem, baseline), truth = heat_set_of(problem, extended);
+  if (!thermal::validate(before_set, estimator_dt_s).ok() || !thermal::validate(truth, estimator_dt_s).ok())
+    return std::nullopt;
+  const thermal::HeatInput<> work = working_point(problem);
+  const double most_A = 50 * problem.rms_A;
+  const double continuous_A = answers_of(truth, truth, work, most_A, 0).continuous_A;
+  if (!(continuous_A > 0)) return std::nullopt;
+  const double burst_A = burst_over_continuous * continuous_A;
+  const Answers before = answers_of(before_set, truth, work, most_A, burst_A),
+                after = answers_of(truth, truth, work, most_A, burst_A);
+  const double direct = std::sqrt(3.0) / 2;  // amperes as the log has them
+  return Gain{before.overshoot_K,           after.overshoot_K,           before.burst_s,   after.burst_s,
+              before.continuous_A * direct, after.continuous_A * direct, burst_A * direct, work[Drive::speed_rad_per_s],
+              work[Boundary::ambient]};
+}
+
+}  // namespace identify

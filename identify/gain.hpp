@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// What the model that was found would change for this motor: the board's own estimator, governor and look-ahead
+// (thermal/) run once with the two-resistor model as fitted and once with the extended one, on a motor that behaves
+// like the extended one. A promise of the model; host-sim measures it on the motor that was recorded.
+#pragma once
+
+#include <optional>
+
+#include "identify/report.hpp"
+
+namespace identify {
+
+/// Nothing when the logs tell no current (heat known as power), or when a set cannot be run.
+/// `extended` is taken for the truth.
+std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const Fit& extended);
+
+}  // namespace identify

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// Does the model that identify finds help the motor it was found on? For each seed: record a hidden motor through the
+// firmware under protection, let identify read the log, and play a push that outlasts the winding with the two-resistor
+// model as fitted, with the model found, and with an oracle that knows the true winding temperature.
+//   build/host/bin/gain --seeds 40 [--first 1] [--excitation duty|designed] [--minutes 20] [--json]
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "boards/host/record.hpp"
+#include "boards/host/run_scene.hpp"
+#include "identify/discover.hpp"
+#include "tests/identify/chance.hpp"
+#include "wire/pc/files.hpp"
+
+namespace {
+
+using namespace boards::host;
+
+const std::string root = HOTCORE_SOURCE_DIR;
+// The promise: true overshoot, and the share of the burst that the truth allows.
+constexpr double most_overshoot_K = 3, least_share = 0.9;
+
+struct Push {
+  double overshoot_K, share;  // of the winding's true limit; of the oracle's impulse
+  bool kept() const { return overshoot_K <= most_overshoot_K && share >= least_share; }
+};
+
+struct Case {
+  std::uint64_t seed;
+  std::string truth, answer;
+  Push before, after;
+};
+
+/// Impulse of the push and how far the true winding passes its limit.
+Trace push(const HiddenMotor& motor, Limiter limiter, const std::string& model) {
+  Scene scene = read_scene("get-up", root + "/host-sim/scenes", {});
+  scene.limiters = {limiter};
+  scene.trust = "identified";
+  scene.model = model;
+  const RunOptions options{.motor_folder = root + "/boards/motors", .plant_motor = motor.motor, .hidden = motor.hidden};
+  return run_scene(scene, options).traces.at(0);
+}
+
+Case played(RecordOptions options, std::uint64_t seed, const std::string& folder) {
+  options.hide = options.seed = seed;
+  const Recording recording = record(options);
+  const std::string log = folder + "/log.csv", before = folder + "/before.toml", after = folder + "/after.toml";
+  wire::pc::write_whole(log, recording.log_csv);
+  const auto sheet = wire::pc::read_motor(options.motor, options.motor_folder);
+  const auto report = identify::discover(identify::logs_of(identify::read_table(log), {}, sheet.motor), sheet);
+  wire::pc::write_whole(before, report.baseline_toml);
+  wire::pc::write_whole(after, report.model_toml);
+
+  const HiddenMotor motor = hidden_motor(options);
+  const double limit_degC = sheet.motor.winding_max_degC;
+  const double best_As = push(motor, Limiter::oracle, "").impulse_As;
+  const auto outcome = [&](const std::string& model) {
+    const Trace trace = push(motor, Limiter::governor, model);
+    return Push{std::max(0.0, trace.hottest_true_degC - limit_degC), trace.impulse_As / best_As};
+  };
+  Case c{seed, nlohmann::json::parse(motor.truth_json)["causes"][0]["id"], report.verdict, outcome(before),
+         outcome(after)};
+  for (const auto& cause : report.causes) c.answer += " " + cause.id;
+  return c;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"What identify's model gains on the motor that was recorded, in host-sim"};
+  int seeds = 10;
+  std::uint64_t first = tests::rotating_seed();
+  double promised = 0.95;
+  bool json = false;
+  RecordOptions options{.motor_folder = root + "/boards/motors", .scene_folder = root + "/host-sim/scenes"};
+  app.add_option("--seeds", seeds, "motors")->capture_default_str();
+  app.add_option("--first", first, "first seed")->capture_default_str();
+  app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
+  app.add_option("--minutes", options.minutes, "of each log")->capture_default_str();
+  app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
+  app.add_option("--promised", promised, "share of helped motors below which the end is an error")
+      ->capture_default_str();
+  app.add_flag("--json", json, "the cases as JSON");
+  CLI11_PARSE(app, argc, argv);
+
+  const std::string folder =
+      (std::filesystem::temp_directory_path() / fmt::format("hotcore_gain_{}", getpid())).string();
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  int missed = 0, helped = 0, harmed = 0;
+  for (int s = 0; s < seeds; ++s) {
+    const Case c = played(options, first + static_cast<std::uint64_t>(s), folder);
+    missed += !c.before.kept();
+    helped += !c.before.kept() && c.after.kept();
+    harmed += c.before.kept() && !c.after.kept();
+    list.push_back({{"seed", c.seed},
+                    {"truth", c.truth},
+                    {"answer", c.answer},
+                    {"overshoot_K", {c.before.overshoot_K, c.after.overshoot_K}},
+                    {"share_of_burst", {c.before.share, c.after.share}}});
+    fmt::print(stderr, "{:>3}/{} seed {:<8} {:<22} overshoot {:5.1f} -> {:5.1f} K, burst {:5.3f} -> {:5.3f}{}  {}\n",
+               s + 1, seeds, c.seed, c.truth, c.before.overshoot_K, c.after.overshoot_K, c.before.share, c.after.share,
+               c.after.kept() ? "" : " MISSED", c.answer);
+  }
+  std::filesystem::remove_all(folder);
+  const bool passed = tests::plausible(helped, missed, promised);
+  if (json)
+    fmt::print("{}\n",
+               nlohmann::ordered_json{
+                   {"missed_by_two_resistors", missed}, {"helped", helped}, {"harmed", harmed}, {"cases", list}}
+                   .dump(2));
+  else
+    fmt::print(
+        "{} motors; two resistors, fitted, miss {} (overshoot above {:g} K or less than {:g} % of the burst); the "
+        "model "
+        "found puts {} of these right and spoils {} of the others\n",
+        seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed);
+  if (!passed) fmt::print(stderr, "{} of {} is less than {:.2f} with any luck.\n", helped, missed, promised);
+  return passed ? 0 : 1;
+}
