@@ -218,16 +218,25 @@ void Chip::run_until(Time until) {
   while (now() < until && !core_.exited()) {
     Time next = std::min(until, nvic.next_event());
     for (const Device* d : devices_) next = std::min(next, d->next_event());
+    if (!outside_.empty()) next = std::min(next, outside_.begin()->first);
     if (rcc.dead() || core_.locked_up())
       core_.skip_to(next);
     else if (next > now())
       core_.run(next);
     flash.restore();
     const Time t = now();
+    event_at_ = nvic.next_event();
     nvic.advance(t);
     for (Device* d : devices_) {
-      if (d->next_event() <= t) d->advance(t);
+      event_at_ = d->next_event();
+      if (event_at_ <= t) d->advance(t);
     }
+    while (!outside_.empty() && outside_.begin()->first <= t) {
+      const auto first = outside_.extract(outside_.begin());
+      event_at_ = first.key();
+      first.mapped()();
+    }
+    event_at_ = never;
     if (nvic.reset_requested()) {
       reset_wanted_ = true;
       wanted_cause_ = ResetCause::software;

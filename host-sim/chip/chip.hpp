@@ -5,6 +5,7 @@
 // are mistakes as well.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -56,11 +57,14 @@ class Chip final : public Host, public Bus {
   void power_off();
   void run_for(double seconds) { run_until(now() + from_s(seconds)); }
   void run_until(Time until);
+  /// Something outside happens then, in the middle of whatever the core is doing.
+  void at(Time when, std::function<void()> happens) { outside_.emplace(when, std::move(happens)); }
   void stop_hse() { rcc.stop_hse(); }
   void set_supply(double volts) { pwr.set_supply(volts); }
 
   // Host
   Time now() const override { return core_.now(); }
+  Time event_time() const override { return std::min(event_at_, core_.now()); }
   std::uint32_t pc() const override { return core_.pc(); }
   void report(const std::string& what, std::uint32_t address) override;
   void reschedule() override { core_.stop_soon(); }
@@ -117,7 +121,9 @@ class Chip final : public Host, public Bus {
   std::map<std::string, std::uint32_t> symbols_;
   Board* board_ = nullptr;
   Mutation mutation_;
+  std::multimap<Time, std::function<void()>> outside_;
   Troubles troubles_;
+  Time event_at_ = never;  // of the event that a device works on; never: the core itself or a pin
   int resets_ = 0;
   ResetCause last_reset_ = ResetCause::power_on, wanted_cause_ = ResetCause::power_on;
   bool reset_wanted_ = false;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The Cortex-M4F core: Unicorn executes the instructions, this file does what Unicorn leaves out: exception entry and
-// return (push 8 or 26 words, EXC_RETURN), tail-chaining, WFI, the CPACR check, and time (instructions at a stated
-// number of cycles each). No wait states, no bus contention: what it counts are instructions, never a deadline.
+// The Cortex-M4F core: Unicorn executes the instructions, this class does what Unicorn leaves out: exception entry and
+// return (push 8 or 26 words, EXC_RETURN) and tail-chaining (exceptions.cpp), WFI, the CPACR check, and time
+// (instructions at a stated number of cycles each). No wait states, no bus contention: what it counts are instructions,
+// never a deadline.
 #pragma once
 
 #include <array>
@@ -35,9 +36,12 @@ struct ExceptionEvent {
   Time when;
 };
 
-/// Own instructions (nested exceptions excluded) of one exception's handler.
+/// Own instructions (nested exceptions excluded) of one exception's handler, and how long it was pending before its
+/// first instruction. The core looks for exceptions where a block of instructions ends, so the wait is at most a block
+/// longer than on silicon (whose 12 cycles of entry are not counted).
 struct LaneCount {
   std::uint64_t calls = 0, total = 0, worst = 0;
+  Time worst_wait = 0;
 };
 
 class Core {
@@ -83,6 +87,10 @@ class Core {
   const std::vector<ExceptionEvent>& events() const { return events_; }
   /// 0: the main program, counted from waking to sleeping, handlers excluded.
   const LaneCount& lane(int exception) const { return lanes_[static_cast<std::size_t>(exception)]; }
+  /// Most handlers active at once since clear_counts().
+  int deepest_nesting() const { return deepest_; }
+  /// Instructions of the longest block executed so far: how coarsely the core looks for exceptions.
+  unsigned longest_block() const { return longest_block_; }
   void clear_counts();
   /// Fault injection: from its next entry on, this exception's handler (0: the main program) never ends.
   void hang(int exception) { hang_ = exception; }
@@ -102,12 +110,15 @@ class Core {
   static void on_interrupt(uc_struct*, std::uint32_t number, void* self);
   static bool on_bad_memory(uc_struct*, int type, std::uint64_t address, int size, std::int64_t value, void* self);
   void block(std::uint32_t address, std::uint32_t size);
+  bool wants_to_stop() const;
   Block decode(std::uint32_t address, std::uint32_t size);
   void dispatch();
   bool masks(bool& primask, bool& faultmask, std::uint32_t& basepri) const;
   void push_and_enter(int exception);
   void enter_handler(int exception, std::uint32_t exc_return);
+  void begin(ExceptionEvent::Kind kind, int exception);
   void exception_return(std::uint32_t exc_return);
+  void stay_here();
   void semihost();
   std::uint32_t reg(int id) const;
   void set(int id, std::uint32_t value);
@@ -126,7 +137,8 @@ class Core {
   std::uint32_t block_ = 0;
   bool sleeping_ = false, exited_ = false, locked_up_ = false, tracing_ = false;
   bool returning_ = false, masked_ = false, bad_memory_ = false;
-  int exit_code_ = -1, fault_ = 0, hang_ = -1;
+  int exit_code_ = -1, fault_ = 0, hang_ = -1, deepest_ = 0;
+  std::uint16_t longest_block_ = 0;
   std::string text_;
   std::vector<ExceptionEvent> events_;
   std::array<LaneCount, exception_count> lanes_{};

@@ -18,6 +18,8 @@ class Host {
  public:
   virtual ~Host() = default;
   virtual Time now() const = 0;
+  /// When what is being told happened: the chip looks up to a block of instructions later.
+  virtual Time event_time() const = 0;
   virtual std::uint32_t pc() const = 0;
   virtual void report(const std::string& what, std::uint32_t address) = 0;
   virtual void reschedule() = 0;                                // an event moved: look again before the next block

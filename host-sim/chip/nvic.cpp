@@ -36,7 +36,9 @@ void Nvic::set_pending(int exception, bool on) {
   if (p == on) return;
   p = on;
   pending_count_ += on ? 1 : -1;
-  if (on) host_.reschedule();
+  if (!on) return;
+  since_[static_cast<std::size_t>(exception)] = host_.event_time();
+  host_.reschedule();
 }
 
 void Nvic::pend(int exception) { set_pending(exception, true); }
@@ -45,7 +47,11 @@ void Nvic::set_line(int irq, bool level) {
   bool& line = line_[static_cast<std::size_t>(irq)];
   if (level == line) return;
   line = level;
-  if (level && !active_[static_cast<std::size_t>(16 + irq)]) set_pending(16 + irq, true);
+  if (!level) return;
+  if (active_[static_cast<std::size_t>(16 + irq)])
+    since_[static_cast<std::size_t>(16 + irq)] = host_.event_time();
+  else
+    set_pending(16 + irq, true);
 }
 
 void Nvic::set_nmi_line(bool level) {
@@ -113,6 +119,7 @@ bool Nvic::wakes() const {
 void Nvic::enter(int exception) {
   set_pending(exception, false);
   active_[static_cast<std::size_t>(exception)] = true;
+  since_[static_cast<std::size_t>(exception)] = host_.now();
   active_stack_.push_back(exception);
 }
 
@@ -120,7 +127,11 @@ void Nvic::leave(int exception) {
   active_[static_cast<std::size_t>(exception)] = false;
   std::erase(active_stack_, exception);
   if (exception == nmi && nmi_line_) pend(nmi);
-  if (exception >= 16 && line_[static_cast<std::size_t>(exception - 16)]) set_pending(exception, true);
+  if (exception >= 16 && line_[static_cast<std::size_t>(exception - 16)]) {
+    const Time rose = since_[static_cast<std::size_t>(exception)];
+    set_pending(exception, true);
+    since_[static_cast<std::size_t>(exception)] = rose;
+  }
 }
 
 std::uint32_t Nvic::bits(const std::array<bool, exception_count>& from, int word) const {

@@ -37,6 +37,7 @@ class Nvic {
   void pend(int exception);
   bool pending(int exception) const { return pending_[static_cast<std::size_t>(exception)]; }
   bool any_pending() const { return pending_count_ > 0; }
+  Time pending_since(int exception) const { return since_[static_cast<std::size_t>(exception)]; }
   /// A synchronous fault; escalates to HardFault when its own handler is off or it cannot preempt.
   void fault(int exception);
 
@@ -69,6 +70,7 @@ class Nvic {
   Host& host_;
   std::array<bool, exception_count> enabled_{}, pending_{}, active_{};
   std::array<bool, irq_count> line_{};
+  std::array<Time, exception_count> since_{};  // pending; or its line came up while it was active
   std::array<std::uint8_t, exception_count> priority_{};
   std::vector<int> active_stack_;
   int pending_count_ = 0;

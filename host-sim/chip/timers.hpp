@@ -85,8 +85,9 @@ class AdvancedTimer : public Device {
   std::array<std::uint32_t, 4> active_{};  // shadow compare registers
   bool running_ = false, down_ = false, break_high_ = true, break_connected_ = false, lock_written_ = false,
        update_on_underflow_ = false;
-  bool compare_fresh_ = false;
-  std::uint32_t frozen_ = 0;  // CNT while stopped
+  bool compare_fresh_ = false;  // written with MOE off, this period
+  int silent_periods_ = 0;      // one after the other
+  std::uint32_t frozen_ = 0;    // CNT while stopped
   Time tick_ = 2, underflow_ = never, overflow_ = never, compare_ = never, last_overflow_ = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the image costs and how well it agrees with the host build: instructions of both lanes, latency and nesting,
-// share of the processor, the thermal limit held, and the same scene on both. Figures are printed; bounds are asserted.
+// What the image costs and how well it agrees with the host build: instructions of both lanes, share
+// of the processor, the thermal limit held, and the same scene on both. Figures are printed; bounds are asserted.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,7 +14,7 @@ namespace image_tests {
 namespace {
 
 using namespace host_sim::chip;
-constexpr int adc_exception = 16 + 18, index0_exception = 16 + 9;
+constexpr int adc_exception = 16 + 18;
 constexpr double half_period_cycles = 4200;  // 168 MHz / 20 kHz / 2
 
 const std::string scenes = std::string(HOTCORE_SOURCE_DIR) + "/host-sim/scenes";
@@ -49,58 +49,6 @@ TEST(Figures, TheFastLaneTakesLessThanHalfOfEachHalfPeriodAtTwoCyclesPerInstruct
     EXPECT_EQ(pcb->chip.resets(), 0);
     EXPECT_EQ(pcb->chip.troubles().count(), 0u) << pcb->chip.report_text();
   }
-}
-
-TEST(Figures, InterruptsNestAsTheTableSays) {
-  NEEDS_IMAGE(image);
-  Options o;
-  o.locked = false;
-  auto pcb = board(o);
-  ASSERT_TRUE(pcb->arm());
-  pcb->chip.core().trace(true);
-  hold(*pcb, 4.0f, -4.0f, 0.12);
-  int deepest = 0, index_in_fast = 0, chained = 0;
-  int running = 0;
-  for (const ExceptionEvent& e : pcb->chip.core().events()) {
-    deepest = std::max(deepest, e.depth);
-    if (e.kind == ExceptionEvent::returned) {
-      running = 0;
-      continue;
-    }
-    chained += e.kind == ExceptionEvent::tail_chained;
-    if (e.exception == adc_exception) {
-      EXPECT_NE(running, index0_exception) << "the fast lane must wait for the index handler";
-    }
-    index_in_fast += e.exception == index0_exception && e.depth >= 2;
-    running = e.exception;
-  }
-  std::printf("deepest nesting %d, tail-chained %d times, index handler inside another %d times\n", deepest, chained,
-              index_in_fast);
-  EXPECT_LE(deepest, 3);
-  EXPECT_GT(pcb->chip.core().lane(index0_exception).calls, 1u);
-  EXPECT_LT(pcb->chip.core().lane(index0_exception).worst, 60u) << "reads a counter that moves 1.5 us a count";
-}
-
-TEST(Figures, LatencyFromConversionToHandlerStaysWithinOneBlockOfInstructions) {
-  NEEDS_IMAGE(image);
-  auto pcb = board();
-  ASSERT_TRUE(pcb->arm());
-  pcb->chip.core().trace(true);
-  hold(*pcb, 4.0f, -4.0f, 0.03);
-  // The conversions of one axis end every 50 us; handlers begin as regularly, but for what was in the way.
-  std::vector<Time> begins;
-  for (const ExceptionEvent& e : pcb->chip.core().events()) {
-    if (e.exception == adc_exception && e.kind != ExceptionEvent::returned) begins.push_back(e.when);
-  }
-  ASSERT_GT(begins.size(), 1000u);
-  Time earliest = never, latest = 0;
-  for (std::size_t i = 1; i < begins.size(); ++i) {
-    earliest = std::min(earliest, begins[i] - begins[i - 1]);
-    latest = std::max(latest, begins[i] - begins[i - 1]);
-  }
-  const double jitter = static_cast<double>(latest - earliest) / 2 / 2;  // two ticks a core cycle, half to each side
-  std::printf("fast lane begins every 25 us with a jitter of +-%.0f instructions\n", jitter);
-  EXPECT_LE(jitter, 120);
 }
 
 TEST(Figures, ReachesTheThermalLimitAndHoldsIt) {

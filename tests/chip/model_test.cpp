@@ -54,6 +54,17 @@ TEST_F(Bench, SaysNothingAboutAFirmwareThatDoesNothing) {
   EXPECT_GT(chip.core().instructions(), 100'000u);
 }
 
+TEST_F(Bench, CountsWhatWasExecutedHoweverOftenItIsLookedAt) {
+  // r1 = 0x20000000; for (r0 = 1;; ++r0) *r1 = r0: three instructions, then six a turn.
+  const std::uint16_t code[] = {0x2000, 0x2120, 0x0609, 0x3001, 0xBF00, 0xBF00, 0xBF00, 0x6008, 0xE7F9, 0xBF00};
+  chip.flash.load(0x08000008, code, sizeof code);
+  chip.power_on();
+  for (int k = 0; k < 20'000; ++k) chip.run_for(10e-9);
+  const std::uint32_t turns = chip.core().word(0x20000000);
+  EXPECT_GT(turns, 500u);
+  EXPECT_EQ(chip.core().instructions(), 3u + 6u * turns);
+}
+
 TEST_F(Bench, ARegisterWithoutItsClockIsAMistake) {
   write(tim1 + 0x2C, 100);
   EXPECT_TRUE(complains("TIM1: write with its clock off"));
