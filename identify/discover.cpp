@@ -47,29 +47,6 @@ void score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFil
   }
 }
 
-std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
-  std::vector<ParameterLine> out;
-  const Eigen::VectorXd sd = f.std_errors();
-  Eigen::Index at = base_count;
-  for (std::size_t c = 0; c < f.chosen.size(); ++c) {
-    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[c].cause)];
-    for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
-      if (c != which) continue;
-      const Parameter& parameter = cause.parameters[p];
-      ParameterLine line;
-      line.name = parameter.name;
-      line.unit = parameter.unit;
-      line.value = parameter_value(problem, cause, static_cast<int>(p), f.x[at]);
-      const double slope = parameter.logarithmic ? line.value : problem.scale(parameter.scale, cause.drive);
-      line.std_error = std::abs(slope) * sd[at];
-      line.at_bound = f.at_bound[static_cast<std::size_t>(at)];
-      line.determined = !line.at_bound && sd[at] < 0.7 * parameter.typical;
-      out.push_back(line);
-    }
-  }
-  return out;
-}
-
 void tell(const Problem& problem, const Search& found, Report& report) {
   report.verdict = word(found.verdict);
   report.tied = found.tied;
@@ -172,6 +149,29 @@ std::string too_poor(const Problem& problem, const Fit& base) {
 }
 
 }  // namespace
+
+std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
+  std::vector<ParameterLine> out;
+  const Eigen::VectorXd sd = f.std_errors();
+  Eigen::Index at = base_count;
+  for (std::size_t c = 0; c < f.chosen.size(); ++c) {
+    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[c].cause)];
+    for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
+      if (c != which) continue;
+      const Parameter& parameter = cause.parameters[p];
+      ParameterLine line;
+      line.name = parameter.name;
+      line.unit = parameter.unit;
+      line.value = parameter_value(problem, cause, static_cast<int>(p), f.x[at]);
+      const double slope = parameter.logarithmic ? line.value : problem.scale(parameter.scale, cause.drive);
+      line.std_error = std::abs(slope) * sd[at];
+      line.at_bound = f.at_bound[static_cast<std::size_t>(at)];
+      line.determined = !line.at_bound && sd[at] < 0.7 * parameter.typical;
+      out.push_back(line);
+    }
+  }
+  return out;
+}
 
 Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held) {
   Report report;

@@ -115,6 +115,7 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "hot_spot")
     x.hot_spot_J_per_K = m.C1_J_per_K * 0.4, x.hot_spot_K_per_W = m.R1_K_per_W * k, x.hot_spot_share = 0.4;
   if (id == "neighbour_heat") x.neighbour_W_per_K = k * G2;
+  if (id == "frame_conduction") x.frame_W_per_K = k * G2;
   if (id == "sensor_lag") x.sensor_lag_s = 20 * k;
   if (id == "sensor_offset") x.sensor_offset_K = 3 * a;
   if (id == "sensor_gain") x.sensor_gain = std::max(-0.35, std::min(0.35, 0.1 * a));
@@ -131,13 +132,63 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "overload") x.overload_W_per_A4 = k * heat_W / std::pow(1.4 * rms_A, 4);
 }
 
+/// The same effect in the terms of identify's table.
+std::vector<double> in_words_of_the_table(const std::string& id, const HiddenEffects& x, const wire::Motor& m,
+                                          double delay_s) {
+  if (id == "speed_loss_linear") return {x.hysteresis_W_s + x.coulomb_drag_W_s};
+  if (id == "speed_loss_quadratic") return {x.eddy_W_s2 + x.viscous_drag_W_s2};
+  if (id == "winding_eddy") return {x.winding_eddy_W_s2};
+  if (id == "ac_copper_loss") return {1.5 * m.phase_resistance_ohm * x.ac_copper_s2};
+  if (id == "load_friction") return {x.load_friction_W_s_per_A};
+  if (id == "copper_coefficient") return {m.copper_coefficient_per_K + x.copper_coefficient_per_K};
+  if (id == "bridge_loss") return {x.bridge_loss_W_per_A};
+  if (id == "current_offset") return {x.current_offset_A};
+  if (id == "board_heat") return {x.board_heat_ohm};
+  if (id == "constant_heat") return {x.constant_heat_W};
+  if (id == "speed_cooling") return {x.speed_cooling_per_speed08};
+  if (id == "natural_convection") return {x.convection_exponent};
+  if (id == "radiation") return {x.radiation_W_per_K};
+  if (id == "cooling_change") return {1 / x.cooling_change, x.cooling_change_s};
+  if (id == "third_mass") return {x.third_mass_J_per_K, x.third_mass_K_per_W};
+  if (id == "hot_spot") return {x.hot_spot_J_per_K, x.hot_spot_K_per_W};
+  if (id == "neighbour_heat") return {x.neighbour_W_per_K};
+  if (id == "frame_conduction") return {x.frame_W_per_K};
+  if (id == "sensor_lag") return {x.sensor_lag_s};
+  if (id == "sensor_offset") return {x.sensor_offset_K};
+  if (id == "sensor_gain") return {x.sensor_gain};
+  if (id == "ambient_drift") return {x.ambient_drift_K_per_s};
+  if (id == "clock_delay") return {delay_s};
+  if (id == "stall_imbalance") return {x.stall_imbalance};
+  return {};
+}
+
+/// Warm things beside the motor that live their own lives: random levels, reached slowly.
+std::vector<double> wandering(Draw& d, std::size_t rows, double ambient_degC, double tau_s) {
+  std::vector<double> out(rows);
+  double level = ambient_degC, target = ambient_degC;
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (i % 2000 == 0) target = ambient_degC + (d.uniform(0, 1) < 0.35 ? 0 : d.uniform(10, 50));
+    out[i] = level += (target - level) * row_s / tau_s;
+  }
+  return out;
+}
+
+std::vector<Row> played(const std::vector<ProfileStretch>& profile) {
+  std::vector<Row> rows;
+  for (const ProfileStretch& p : profile) {
+    for (double t = 0; t < p.seconds - 1e-9; t += row_s)
+      rows.push_back({p.current_A * 2 / std::sqrt(3.0), p.speed_rad_per_s});
+  }
+  return rows;
+}
+
 struct Track {
   std::vector<double> core, housing, sensed, neighbour;
 };
 
 Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const HiddenEffects& hidden, double delay_s,
           const std::vector<Row>& rows, double ambient_degC, double start_degC, const std::vector<double>& neighbour,
-          std::uint64_t seed) {
+          const std::vector<double>& frame, std::uint64_t seed) {
   host_sim::Stove stove(host_sim::heat_from_sheet(truth, options), hidden, seed);
   stove.soak(start_degC);
   stove.around.ambient_degC = ambient_degC;
@@ -157,6 +208,7 @@ Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const 
     drive.current2_A2 = amps * amps;
     drive.speed_rad_per_s = w;
     stove.around.neighbour_degC = neighbour[i];
+    stove.around.frame_degC = frame[i];
     stove.advance(row_s, drive);
   }
   return out;
@@ -171,11 +223,11 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
 }  // namespace
 
 std::vector<std::string> hideable() {
-  return {"speed_loss_linear",  "speed_loss_quadratic", "winding_eddy",   "ac_copper_loss", "load_friction",
-          "copper_coefficient", "bridge_loss",          "current_offset", "board_heat",     "constant_heat",
-          "speed_cooling",      "natural_convection",   "radiation",      "cooling_change", "third_mass",
-          "hot_spot",           "neighbour_heat",       "sensor_lag",     "sensor_offset",  "sensor_gain",
-          "ambient_drift",      "clock_delay",          "stall_imbalance"};
+  return {"speed_loss_linear",  "speed_loss_quadratic", "winding_eddy",     "ac_copper_loss", "load_friction",
+          "copper_coefficient", "bridge_loss",          "current_offset",   "board_heat",     "constant_heat",
+          "speed_cooling",      "natural_convection",   "radiation",        "cooling_change", "third_mass",
+          "hot_spot",           "neighbour_heat",       "frame_conduction", "sensor_lag",     "sensor_offset",
+          "sensor_gain",        "ambient_drift",        "clock_delay",      "stall_imbalance"};
 }
 
 std::vector<std::string> outside() {
@@ -206,15 +258,15 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
   rms_A = std::min(rms_A, std::sqrt(60 / (1.5 * m.phase_resistance_ohm * 1.4 * m.R1_K_per_W)) / 1.6);
   const double top = d.uniform(250, 600), ambient = d.uniform(18, 30);
   const double start = d.uniform(0, 1) < 0.6 ? ambient : ambient + d.uniform(0, 12);
-  const auto rows = o.duty == Duty::robot
-                        ? robot_duty(d, rms_A, top, o.seconds)
-                        : designed_profile(d, rms_A * (o.duty == Duty::designed ? 0.95 : 1), top, o.seconds);
-  std::vector<double> neighbour(rows.size());
-  double level = ambient, target = ambient;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (i % 2000 == 0) target = ambient + (d.uniform(0, 1) < 0.35 ? 0 : d.uniform(10, 50));
-    neighbour[i] = level += (target - level) * row_s / 180;
-  }
+  const auto duty = [&](Draw& draw) {
+    return o.duty == Duty::robot ? robot_duty(draw, rms_A, top, o.seconds)
+                                 : designed_profile(draw, rms_A * 0.95, top, o.seconds);
+  };
+  auto rows = duty(d);
+  auto neighbour = wandering(d, rows.size(), ambient, 180);
+  Draw mount{
+      std::mt19937_64(o.seed * 104729 + 3)};  // its own stream: the rest stays as it was before there was a frame
+  auto frame = wandering(mount, rows.size(), ambient, 250);
   double mean2 = 0;
   for (const Row& r : rows) mean2 += r.current_A * r.current_A / static_cast<double>(rows.size());
   const double mean_heat = 1.5 * m.phase_resistance_ohm * mean2;
@@ -229,7 +281,7 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
   // Size: the winding (or, for what only the sensor sees, the reading) is to be off by 1..10 K rms before any refit.
   HiddenEffects hidden;
   double delay_s = 0;
-  const Track clean = run(m, options, hidden, 0, rows, ambient, start, neighbour, o.seed);
+  const Track clean = run(m, options, hidden, 0, rows, ambient, start, neighbour, frame, o.seed);
   for (std::size_t e = 0; e < o.effects.size(); ++e) {
     const bool other = d.uniform(0, 1) < 0.5;
     const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds, wanted = d.log_uniform(1, 10) * o.strength;
@@ -238,7 +290,7 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
       HiddenEffects one;
       double late = 0;
       hide(one, o.effects[e], a, m, mean_heat, rms_A, top, when, other, late);
-      const Track t = run(m, options, one, late, rows, ambient, start, neighbour, o.seed);
+      const Track t = run(m, options, one, late, rows, ambient, start, neighbour, frame, o.seed);
       error = std::max(rms(t.core, clean.core), rms(t.sensed, clean.sensed));
       if (!(error > 1e-6) || std::abs(error / wanted - 1) < 0.1) break;
       a = std::max(-6.0, std::min(6.0, a * std::max(0.1, std::min(10.0, wanted / error))));
@@ -255,11 +307,20 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
       if (std::find(o.effects.begin(), o.effects.end(), id) != o.effects.end()) hidden = before;
     }
   }
-  const Track t = run(m, options, hidden, delay_s, rows, ambient, start, neighbour, o.seed);
+  for (const std::string& id : o.effects) {
+    if (auto values = in_words_of_the_table(id, hidden, m, delay_s); !values.empty()) out.parameters[id] = values;
+  }
+  if (o.again != 0 || !o.profile.empty()) {
+    d = Draw{std::mt19937_64((o.seed ^ (o.again << 32)) * 15485863 + 11)};
+    rows = o.profile.empty() ? duty(d) : played(o.profile);
+    neighbour = wandering(d, rows.size(), ambient, 180);
+    frame = wandering(d, rows.size(), ambient, 250);
+  }
+  const Track t = run(m, options, hidden, delay_s, rows, ambient, start, neighbour, frame, o.seed + o.again);
   out.core_degC = t.core;
 
   std::ofstream csv(path);
-  csv << "time_s,current_A,speed_rad_per_s,housing_degC,ambient_degC,neighbour_housing_degC"
+  csv << "time_s,current_A,speed_rad_per_s,housing_degC,ambient_degC,neighbour_housing_degC,frame_degC"
       << (o.core == Core::none ? "" : ",core_degC") << "\n";
   double wander = 0.05 * d.gauss();
   const double keep = std::exp(-row_s / 20), direct = std::sqrt(3.0) / 2;
@@ -268,9 +329,9 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
     wander = keep * wander + std::sqrt(1 - keep * keep) * 0.05 * d.gauss();
     const double housing = 0.1 * std::round((t.sensed[i] + wander + 0.2 * d.gauss()) / 0.1);
     const double amps = rows[i].current_A == 0 ? 0 : rows[i].current_A * (1 + 0.01 * d.gauss());
-    fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.1f},{:.2f},{:.2f}",
+    fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.1f},{:.2f},{:.2f},{:.2f}",
                    static_cast<double>(i) * row_s, amps * direct, rows[i].speed_rad_per_s, housing,
-                   ambient + 0.05 * d.gauss(), neighbour[i] + 0.1 * d.gauss());
+                   ambient + 0.05 * d.gauss(), neighbour[i] + 0.1 * d.gauss(), frame[i] + 0.1 * mount.gauss());
     if (o.core != Core::none) text += ',';
     if (o.core == Core::dense) fmt::format_to(std::back_inserter(text), "{:.2f}", t.core[i] + 0.2 * d.gauss());
     if (o.core == Core::sparse && i % 300 == 0)

@@ -4,6 +4,7 @@
 // Effect, size, sign, time, motor, duty and seed come from one number that the program never sees.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,11 @@ namespace tests {
 
 enum class Duty { robot, designed };
 enum class Core { none, sparse, dense };
+
+/// A stretch of a profile: direct current as the log has it.
+struct ProfileStretch {
+  double seconds, current_A, speed_rad_per_s;
+};
 
 struct HiddenLogOptions {
   Duty duty = Duty::robot;
@@ -26,6 +32,10 @@ struct HiddenLogOptions {
       0.1;  // teeth, yoke, frame as share of host-sim's defaults: how far the clean motor is from two nodes
   double seconds = 1200;
   bool small_ones = false;  // eleven small effects besides
+  // A further log of the same motor with the same effect, sized as before: another duty and noise from this seed, or
+  // this profile played.
+  std::uint64_t again = 0;
+  std::vector<ProfileStretch> profile;
 };
 
 struct HiddenLog {
@@ -35,6 +45,8 @@ struct HiddenLog {
   std::string motor;
   double core_error_K = 0;        // rms of the winding with the effect against without it
   std::vector<double> core_degC;  // truth at each row
+  // What each effect truly is, in the parameters of identify's table (none for effects outside of it).
+  std::map<std::string, std::vector<double>> parameters;
 };
 
 /// All ids that can be hidden (of the catalogue), and those outside of it.

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#include "tests/identify/score_case.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "identify/discover.hpp"
+#include "identify/experiment.hpp"
+#include "identify/table.hpp"
+
+namespace tests {
+namespace {
+
+using identify::Fit, identify::Problem, identify::Search, identify::Verdict;
+
+constexpr double row_s = 0.1;
+
+wire::pc::MotorFile sheet_of(const HiddenLog& log) {
+  wire::pc::MotorFile file;
+  file.motor = log.sheet;
+  file.name = log.motor;
+  return file;
+}
+
+std::vector<identify::Log> read(const HiddenLog& log, const std::string& path) {
+  return identify::logs_of(identify::read_table(path), {}, log.sheet);
+}
+
+/// rms of the simulated winding against the truth, log 0 of the problem.
+double core_error_K(const Problem& problem, const Fit& fit, const std::vector<double>& truth_degC) {
+  const auto replayed = identify::replayed(problem, fit, 0);
+  const identify::Bins& log = problem.logs.front();
+  double sum = 0;
+  int n = 0;
+  for (std::size_t k = 0; k < log.bins.size(); ++k) {
+    const double place = (static_cast<double>(k) + static_cast<double>(log.bins[k].core_at)) * log.width_s / row_s;
+    const auto row = static_cast<std::size_t>(std::lround(place));
+    if (row >= truth_degC.size()) break;
+    sum += std::pow(replayed.core_degC[k] - truth_degC[row], 2);
+    ++n;
+  }
+  return std::sqrt(sum / std::max(n, 1));
+}
+
+void measure_gain(const CaseOptions& options, const HiddenLog& log, const Problem& problem, const Search& found,
+                  const std::string& path, CaseResult& result) {
+  HiddenLogOptions other = options.log;
+  other.again = 1;
+  const HiddenLog second = make_hidden_log(other, path);
+  Problem unseen = problem;
+  unseen.logs = identify::problem_of(read(log, path), sheet_of(log)).logs;
+  const bool extends = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
+  result.core_before_K = core_error_K(unseen, identify::transferred(unseen, found.base.fit), second.core_degC);
+  result.core_after_K = extends
+                            ? core_error_K(unseen, identify::transferred(unseen, found.chosen.fit), second.core_degC)
+                            : *result.core_before_K;
+}
+
+void check_parameters(const HiddenLog& log, const Problem& problem, const Search& found, CaseResult& result) {
+  if (result.outcome() != Outcome::right) return;
+  const Fit& fit = found.chosen.fit;
+  for (std::size_t c = 0; c < fit.chosen.size(); ++c) {
+    const auto lines = identify::cause_lines(problem, fit, c);
+    const auto truth = log.parameters.find(identify::causes()[static_cast<std::size_t>(fit.chosen[c].cause)].id);
+    if (truth == log.parameters.end()) continue;
+    for (std::size_t p = 0; p < lines.size() && p < truth->second.size(); ++p) {
+      const bool right = std::abs(lines[p].value - truth->second[p]) <= 2 * lines[p].std_error;
+      ++result.parameters;
+      result.parameters_right += right;
+      if (!right)
+        result.remarks += fmt::format(" {} {:.4g} +- {:.2g}, truly {:.4g};", lines[p].name, lines[p].value,
+                                      lines[p].std_error, truth->second[p]);
+    }
+  }
+}
+
+/// How far the nearest rival stays behind when the truth makes this log without noise.
+double separability(const Problem& problem, const std::vector<std::string>& truth) {
+  std::vector<identify::Chosen> chosen;
+  for (const std::string& id : truth) chosen.push_back({identify::cause_named(id), -1});
+  Problem clean = problem;
+  const auto replayed = identify::replayed(problem, identify::fit(problem, chosen), 0);
+  for (std::size_t k = 0; k < clean.logs.front().bins.size(); ++k) {
+    identify::Bin& bin = clean.logs.front().bins[k];
+    if (bin.housing_n > 0) bin.housing_degC = replayed.housing_degC[k];
+    if (bin.core_n > 0) bin.core_degC = replayed.core_degC[k];
+  }
+  const Fit base = identify::fit(clean, {});
+  double D = 2 * base.misfit;
+  for (std::size_t c = 0; c < identify::causes().size(); ++c) {
+    const identify::Cause& cause = identify::causes()[c];
+    if (std::find(truth.begin(), truth.end(), cause.id) != truth.end() || !clean.possible(cause) ||
+        cause.edit == identify::Edit::cooling_of_log)
+      continue;
+    D = std::min(D, 2 * identify::fit(clean, {{static_cast<int>(c), -1}}, &base).misfit);
+  }
+  return D;
+}
+
+/// Plays the advised experiment once and asks again with both logs.
+void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<identify::Log>& first,
+            const Problem& problem, const Search& found, const std::string& path, CaseResult& result) {
+  const auto advice = identify::experiment(problem, found);
+  if (!advice) return;
+  HiddenLogOptions bench = options.log;
+  bench.again = 2;
+  for (const identify::ProfileStep& p : advice->profile)
+    bench.profile.push_back({p.seconds, p.current_A, p.speed_rad_per_s});
+  make_hidden_log(bench, path);
+  auto both = first;
+  for (identify::Log& more : read(log, path)) both.push_back(std::move(more));
+  CaseResult again;
+  const Search now = identify::search(identify::problem_of(both, sheet_of(log)), options.margins, options.removed);
+  again.truth = result.truth;
+  again.verdict = now.verdict;
+  again.answer = now.tied;
+  result.resolved = again.outcome() == Outcome::right;
+  result.remarks += fmt::format(" after the advised experiment ({}): {};", advice->why, again.answer_text());
+}
+
+}  // namespace
+
+std::string joined(const std::vector<std::string>& ids) {
+  std::string out;
+  for (const auto& id : ids) out += (out.empty() ? "" : "+") + id;
+  return out;
+}
+
+bool CaseResult::named() const { return verdict == Verdict::explained || verdict == Verdict::partly_explained; }
+
+Outcome CaseResult::outcome_for(const std::vector<std::string>& ids) const {
+  const bool among = std::find(answer.begin(), answer.end(), ids) != answer.end();
+  if (named()) return !ids.empty() && answer.front() == ids ? Outcome::right : Outcome::wrong;
+  if (verdict == Verdict::ambiguous) return among ? Outcome::tied_right : Outcome::tied_wrong;
+  return verdict == Verdict::adequate ? Outcome::silent : Outcome::unknown;
+}
+
+std::string CaseResult::answer_text() const {
+  if (!named() && verdict != Verdict::ambiguous) return identify::word(verdict);
+  std::string out;
+  for (const auto& ids : answer) out += (out.empty() ? "" : " | ") + joined(ids);
+  return (named() ? "" : "tie: ") + out;
+}
+
+CaseResult play(const CaseOptions& options, const std::string& path) {
+  const HiddenLog log = make_hidden_log(options.log, path);
+  const auto logs = read(log, path);
+  CaseResult result;
+  result.truth = options.log.effects;
+  std::sort(result.truth.begin(), result.truth.end());
+  const std::clock_t start = std::clock();
+  const Problem problem = identify::problem_of(logs, sheet_of(log));
+  const Search found = identify::search(problem, options.margins, options.removed);
+  result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  result.verdict = found.verdict;
+  result.answer = found.tied;
+  result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
+                               found.base.ratio, found.chosen.ratio, found.chosen.explained);
+  check_parameters(log, problem, found, result);
+  if (options.separability && result.truth.size() == 1 && identify::cause_named(result.truth.front()) >= 0)
+    result.D = separability(problem, result.truth);
+  if (options.gain) measure_gain(options, log, problem, found, path, result);
+  if (options.follow && found.verdict == Verdict::ambiguous) follow(options, log, logs, problem, found, path, result);
+  return result;
+}
+
+}  // namespace tests
