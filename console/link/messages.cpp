@@ -39,6 +39,13 @@ bool is_name(const std::string& name) {
   });
 }
 
+/// "rad/s", "degC", or nothing.
+bool is_unit(const std::string& unit) {
+  std::string joined = unit;
+  std::replace(joined.begin(), joined.end(), '/', '_');
+  return unit.empty() || is_name(joined);
+}
+
 /// Head, then name, unit and doc.
 template <class Head>
 bool described(const wire::Frame& frame, wire::Kind kind, Head& head, Description& d) {
@@ -47,8 +54,7 @@ bool described(const wire::Frame& frame, wire::Kind kind, Head& head, Descriptio
   head = *message;
   auto rest = std::span(frame.payload, frame.bytes).subspan(sizeof(Head));
   if (!text(rest, d.name) || !text(rest, d.unit) || !text(rest, d.doc)) return false;
-  if (!is_name(d.name) || (!d.unit.empty() && !is_name(d.unit)) || head.axes < 1 || head.axes > wire::axis_count)
-    return false;
+  if (!is_name(d.name) || !is_unit(d.unit) || head.axes < 1 || head.axes > wire::axis_count) return false;
   d.id = head.id;
   d.per_axis = head.axes > 1;
   return true;

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include "console/commands.hpp"
+
+namespace console {
+namespace {
+
+constexpr const char* examples =
+    "hotcore: talk to a driver board on USB\n"
+    "\n"
+    "Examples\n"
+    "  hotcore list                                  boards that are plugged in\n"
+    "  hotcore watch                                 live values and curves of both axes\n"
+    "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now?\n"
+    "  hotcore run \"5A 1s, 0A 0.5s\" --axis 1         arm, play a course of current, disarm\n"
+    "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
+    "  hotcore backup mine.toml                      all parameters into a file\n"
+    "  hotcore log --out run.csv --seconds 60        a log that identify reads as it is\n"
+    "  hotcore fault                                 what happened, the evidence, what to do\n"
+    "  hotcore                                       a prompt with completion\n"
+    "  hotcore --sim watch                           the same on a simulated board, without any hardware\n";
+
+constexpr const char* exit_codes =
+    "Exit codes: 0 done; 2 command line or file wrong; 3 data unusable; 4 no board, or several fit; 5 no permission\n"
+    "(see hotcore udev); 6 busy; 7 the board went away; 8 the board refused; 9 versions differ; 130 Ctrl-C, "
+    "disarmed.\n";
+
+void add_options(CLI::App& app, Console& console) {
+  app.add_option("--serial", console.options.serial, "the board whose serial begins so");
+  app.add_flag("--sim", console.options.sim, "a simulated board in this process");
+  app.add_flag("--json", console.options.json, "answer in JSON, one object a line");
+}
+
+}  // namespace
+
+void add_commands(CLI::App& app, Console& console) {
+  app.fallthrough();  // options of the program may stand behind the command
+  add_boards(app, console);
+  add_parameters(app, console);
+  add_motion(app, console);
+  add_records(app, console);
+  add_identify(app, console);
+}
+
+int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {
+  CLI::App app{examples, "hotcore"};
+  app.footer(exit_codes);
+  add_options(app, console);
+  add_commands(app, console);
+  int code = 0;
+  const auto failed = [&](const std::string& sentence, int exit_code) {
+    code = exit_code;
+    if (console.options.json) fmt::print("{}\n", Json{{"error", sentence}, {"exit_code", exit_code}}.dump());
+    fmt::print(stderr, "{}\n", sentence);
+  };
+  try {
+    parse(app);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help
+    failed(std::string(error.what()) + " ('hotcore --help' shows how).", static_cast<int>(Exit::usage));
+  } catch (const UserError& error) {
+    if (error.exit_code() == static_cast<int>(Exit::gone)) console.hang_up();
+    failed(error.what(), error.exit_code());
+  }
+  return code;
+}
+
+}  // namespace console

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "console/console.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+
+namespace console {
+namespace {
+
+volatile std::sig_atomic_t seen_signal = 0;
+
+void note(int signal) { seen_signal = signal; }
+
+bool install() {
+  struct sigaction action {};
+  action.sa_handler = note;  // no SA_RESTART: whatever waits returns
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+  return true;
+}
+
+}  // namespace
+
+Session& Console::session() {
+  if (!session_) {
+    session_.emplace(options.sim ? simulated_(options) : usb().open(options.serial));
+  }
+  return *session_;
+}
+
+link::Usb& Console::usb() {
+  if (!usb_) usb_.emplace();
+  return *usb_;
+}
+
+void Console::say(const std::string& text, const Json& json) const {
+  if (options.json)
+    fmt::print("{}\n", json.dump());
+  else
+    fmt::print("{}", text);
+  std::fflush(stdout);
+}
+
+void Console::tell(const std::string& text) const {
+  if (!options.json) fmt::print(stderr, "{}\n", text);
+}
+
+bool interrupted() {
+  static const bool installed = install();
+  return installed && seen_signal != 0;
+}
+
+void forget_interrupt() { seen_signal = 0; }
+
+void stop_if_interrupted(const std::string& state) {
+  if (interrupted()) throw UserError(Exit::interrupted, state);
+}
+
+std::string shown(float value) { return std::isnan(value) ? "unset" : fmt::format("{:.6g}", value); }
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+int terminal_width() {
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= 40) return size.ws_col;
+  return 100;
+}
+
+bool on_terminal() {
+  const char* kind = std::getenv("TERM");
+  return isatty(STDOUT_FILENO) == 1 && kind != nullptr && std::string(kind) != "dumb";
+}
+
+}  // namespace console

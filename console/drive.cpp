@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#include "console/drive.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "console/console.hpp"
+
+namespace console {
+namespace {
+
+constexpr double interval_s = 0.005;  // a twentieth of the time-out of setpoints
+
+}  // namespace
+
+Armed::Armed(Session& session, std::uint8_t mask) : session_(session), mask_(mask) {
+  interrupted();  // from here on Ctrl-C is noted and no longer kills
+  session_.arm(mask_);
+}
+
+Armed::~Armed() {
+  try {
+    session_.disarm(mask_);
+  } catch (const UserError&) {
+    // The board is gone or deaf: setpoints have ended, so it ramps down and opens the bridge.
+  }
+}
+
+std::string fault_sentence(const wire::FaultEvidence& evidence) {
+  if (evidence.fault == 0) return "";
+  const wire::CodeText text = wire::text_of(evidence.fault);
+  const std::string unit = text.unit[0] != '\0' ? std::string(" ") + text.unit : "";
+  std::string sentence =
+      text.happened[0] != '\0' ? text.happened : fmt::format("fault {:#04x}, unknown to this program", evidence.fault);
+  if (std::isfinite(evidence.value) && !unit.empty())
+    sentence += fmt::format(": {:.4g}{}, the bound is {:.4g}{}", evidence.value, unit, evidence.threshold, unit);
+  sentence += fmt::format(", {:.1f} s ago", evidence.age_s);
+  if (text.advice[0] != '\0') sentence += fmt::format("; {}", text.advice);
+  return sentence;
+}
+
+Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+             const std::function<void(const wire::State&, double)>& look) {
+  const int first = (mask & 1) != 0 ? 0 : 1;
+  Driven driven;
+  const double start_s = session.now_s();
+  double last_s = start_s, end_s = start_s, next_s = start_s;
+  bool begun = false;
+  for (const Piece& piece : profile) {
+    end_s += double{piece.seconds};
+    while (session.now_s() < end_s) {
+      stop_if_interrupted("Stopped and disarmed.");
+      const wire::State state = session.exchange({mask, {}, {0, 0}, {piece.current_A, piece.current_A}});
+      const double now_s = session.now_s();
+      for (int a = 0; a < wire::axis_count; ++a) {
+        if ((mask >> a & 1) == 0) continue;
+        if (state.axis[a].fault != 0) {
+          throw UserError(Exit::refused, fmt::format("Axis {} tripped after {:.2f} s: {}.", a, now_s - start_s,
+                                                     fault_sentence(session.fault(a))));
+        }
+        if (state.axis[a].refused != 0) {
+          const wire::CodeText text = wire::text_of(state.axis[a].refused);
+          throw UserError(Exit::refused, fmt::format("Axis {} refused the setpoint {:g} A: {}; {}.", a, piece.current_A,
+                                                     text.happened, text.advice));
+        }
+      }
+      const wire::AxisReport& axis = state.axis[first];
+      if (!begun) driven.start_degC = axis.core_degC;
+      begun = true;
+      driven.peak_A = std::max(driven.peak_A, std::hypot(axis.id_A, axis.iq_A));
+      driven.peak_degC = std::max(driven.peak_degC, axis.core_degC);
+      driven.end_degC = axis.core_degC;
+      if (axis.limit != 0) {
+        driven.held_back_s += now_s - last_s;
+        driven.limit = axis.limit;
+      }
+      last_s = now_s;
+      look(state, now_s - start_s);
+      next_s = std::max(next_s + interval_s, now_s);
+      session.wait_until(std::min(next_s, end_s));
+    }
+  }
+  driven.seconds = session.now_s() - start_s;
+  return driven;
+}
+
+}  // namespace console

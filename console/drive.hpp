@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Moving a motor from the console: arm, send setpoints often enough, and disarm whatever happens.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "console/profile.hpp"
+#include "console/session.hpp"
+
+namespace console {
+
+/// Armed axes. They are disarmed when this ends, also by an exception or Ctrl-C; a board that is gone lets go by itself
+/// (its setpoints grow old).
+class Armed {
+ public:
+  Armed(Session& session, std::uint8_t mask);
+  ~Armed();
+  Armed(const Armed&) = delete;
+  Armed& operator=(const Armed&) = delete;
+
+ private:
+  Session& session_;
+  std::uint8_t mask_;
+};
+
+/// What a drive came to, of one axis.
+struct Driven {
+  double seconds = 0;
+  float peak_A = 0;  // of |i|
+  float start_degC = 0, peak_degC = 0, end_degC = 0;
+  double held_back_s = 0;  // below what was asked
+  std::uint8_t limit = 0;  // what held it back most recently
+};
+
+/// Plays a course of iq on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError:
+/// refused when an axis trips or refuses a setpoint, interrupted after Ctrl-C, gone. The caller holds an Armed.
+Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+             const std::function<void(const wire::State&, double)>& look);
+
+/// The sentence of a fault: what happened, evidence, advice. Empty for none.
+std::string fault_sentence(const wire::FaultEvidence& evidence);
+
+}  // namespace console

@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: MIT
+#include "console/commands.hpp"
+
+namespace console {
+void add_identify(CLI::App&, Console&) {}
+}  // namespace console

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "console/live.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "console/plot.hpp"
+
+namespace console {
+namespace {
+
+constexpr std::size_t most_points = 1000;  // two a character, and terminals are narrower
+
+void push(std::vector<float>& trail, float value) {
+  if (trail.size() == most_points) trail.erase(trail.begin());
+  trail.push_back(value);
+}
+
+std::string label(const char* name, float value, const char* unit) {
+  return fmt::format("{} {:.1f} {}", name, value, unit);
+}
+
+}  // namespace
+
+std::string mode_text(std::uint8_t mode) {
+  constexpr const char* texts[] = {"off", "ready", "running",
+                                   "tripped"};  // firmware/mode.hpp, as wire/protocol.hpp tells
+  return mode < std::size(texts) ? texts[mode] : fmt::format("mode {}", mode);
+}
+
+Json json_of(const wire::State& state, double time_s) {
+  Json axes = Json::array();
+  for (const wire::AxisReport& axis : state.axis) {
+    axes.push_back({{"mode", mode_text(axis.mode)},
+                    {"limit", wire::text_of(axis.limit).name},
+                    {"fault", wire::text_of(axis.fault).name},
+                    {"id_A", number(axis.id_A)},
+                    {"iq_A", number(axis.iq_A)},
+                    {"speed_rad_per_s", number(axis.speed_rad_per_s)},
+                    {"rotor_rad", number(axis.rotor_rad)},
+                    {"core_degC", number(axis.core_degC)},
+                    {"core_sigma_K", number(axis.core_sigma_K)},
+                    {"housing_degC", number(axis.housing_degC)},
+                    {"allowance_A", number(axis.allowance_A)}});
+  }
+  return {{"time_s", number(time_s)}, {"bus_V", number(state.bus_V)}, {"axes", axes}};
+}
+
+Live::Live(std::uint8_t mask) : mask_(mask), terminal_(on_terminal()), trails_(wire::axis_count) {}
+
+std::string Live::table(const wire::State& state) const {
+  std::string text = fmt::format("{:<5}{:<9}{:>9}{:>9}{:>11}{:>16}{:>10}{:>12}   {}\n", "axis", "mode", "id A", "iq A",
+                                 "rad/s", "core degC", "housing", "allowance A", "limit");
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask_ >> a & 1) == 0) continue;
+    const wire::AxisReport& axis = state.axis[a];
+    const std::string core = fmt::format("{:.1f} +-{:.1f}", axis.core_degC, axis.core_sigma_K);
+    const char* holding = axis.fault != 0   ? wire::text_of(axis.fault).name
+                          : axis.limit != 0 ? wire::text_of(axis.limit).name
+                                            : "";
+    text += fmt::format("{:<5}{:<9}{:>9.2f}{:>9.2f}{:>11.1f}{:>16}{:>10.1f}{:>12.2f}   {}\n", a, mode_text(axis.mode),
+                        axis.id_A, axis.iq_A, axis.speed_rad_per_s, core, axis.housing_degC, axis.allowance_A, holding);
+  }
+  return text;
+}
+
+void Live::show(const wire::State& state, double time_s) {
+  if (time_s - drawn_s_ < (terminal_ ? 0.05 : 0.5)) return;
+  drawn_s_ = time_s;
+  std::string text = fmt::format("{:7.2f} s   bus {:.1f} V\n", time_s, state.bus_V) + table(state);
+  if (terminal_) {
+    for (int a = 0; a < wire::axis_count; ++a) {
+      const wire::AxisReport& axis = state.axis[a];
+      Trail& trail = trails_[static_cast<std::size_t>(a)];
+      push(trail.core_degC, axis.core_degC);
+      push(trail.housing_degC, axis.housing_degC);
+      push(trail.iq_A, axis.iq_A);
+      push(trail.allowance_A, axis.allowance_A);
+      if ((mask_ >> a & 1) == 0) continue;
+      const std::string head = fmt::format("axis {} ", a);
+      text += plot({{head + label("core", axis.core_degC, "degC"), trail.core_degC},
+                    {label("housing", axis.housing_degC, "degC"), trail.housing_degC}},
+                   terminal_width(), 6, 10.0f, true);
+      text += plot({{head + label("iq", axis.iq_A, "A"), trail.iq_A},
+                    {label("allowance", axis.allowance_A, "A"), trail.allowance_A}},
+                   terminal_width(), 4, 1.0f, true);
+    }
+    // Up over what was drawn last, then each line over the old one; \033[K clears what the old one had more.
+    std::string drawn = lines_ > 0 ? fmt::format("\033[{}A", lines_) : "";
+    for (const char c : text) drawn += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
+    lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    text = drawn;
+  }
+  fmt::print("{}", text);
+  std::fflush(stdout);
+}
+
+}  // namespace console

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "console/log_file.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "console/parameter_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace console {
+
+using wire::pc::Exit;
+using wire::pc::UserError;
+
+std::string column_name(const Target& signal) {
+  const std::string name = full_name(*signal.what);
+  if (name == "housing_measured_degC") return "housing_degC";
+  if (name == "housing_degC" || name == "core_degC") return signal.what->name + "_estimate_degC";
+  return name;
+}
+
+std::string preamble(Session& session, const std::string& what) {
+  const wire::Hello& hello = session.hello();
+  const std::vector<Target> targets = session.parameters().all();
+  return fmt::format(
+      "# hotcore log: {}\n# board: {} {}\n# firmware: {}\n# parameters: {:08x}\n# recorded: {:%Y-%m-%dT%H:%M:%SZ}\n",
+      what, hello.board, hello.serial, hello.firmware, hash_of(targets, session.get(targets)),
+      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+}
+
+LogFile::LogFile(const std::string& path, const std::string& preamble, const std::vector<std::string>& columns)
+    : path_(path), unfinished_(path + ".part") {
+  std::error_code error;
+  const auto folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  out_.open(unfinished_, std::ios::binary);
+  out_ << preamble << "time_s," << fmt::format("{}", fmt::join(columns, ",")) << "\n";
+  if (!out_) throw UserError(Exit::usage, path + ": cannot be written; choose another folder or make room.");
+}
+
+LogFile::~LogFile() {
+  if (finished_) return;
+  out_.close();
+  std::error_code ignored;
+  if (rows_ > 0)
+    std::filesystem::rename(unfinished_, path_, ignored);
+  else
+    std::filesystem::remove(unfinished_, ignored);
+}
+
+void LogFile::add(double time_s, const std::vector<float>& values) {
+  std::string row = fmt::format("{:.6f}", time_s);
+  for (const float v : values) row += std::isnan(v) ? std::string(",") : fmt::format(",{:.7g}", v);
+  out_ << row + "\n";
+  ++rows_;
+  last_s_ = time_s;
+}
+
+void LogFile::finish() {
+  out_.close();
+  if (!out_) throw UserError(Exit::usage, path_ + ": the disk is full; make room and log again.");
+  std::error_code error;
+  std::filesystem::rename(unfinished_, path_, error);
+  if (error)
+    throw UserError(Exit::usage, path_ + ": cannot be written (" + error.message() + "); choose another place.");
+  finished_ = true;
+}
+
+double BoardTime::at(std::uint32_t period) {
+  if (begun_) elapsed_ += period - last_;
+  begun_ = true;
+  last_ = period;
+  return static_cast<double>(elapsed_) / pwm_Hz_;
+}
+
+}  // namespace console

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "console/commands.hpp"
+#include "console/drive.hpp"
+#include "console/live.hpp"
+
+namespace console {
+namespace {
+
+std::uint8_t mask_of(const std::string& axis) { return axis == "both" ? 3 : axis == "1" ? 2 : 1; }
+
+Json json_of(const Driven& d) {
+  return {{"seconds", d.seconds},
+          {"peak_A", number(d.peak_A)},
+          {"core_start_degC", number(d.start_degC)},
+          {"core_peak_degC", number(d.peak_degC)},
+          {"core_end_degC", number(d.end_degC)},
+          {"held_back_s", d.held_back_s},
+          {"limit", wire::text_of(d.limit).name}};
+}
+
+void play(Console& console, const std::string& axis, const std::vector<Piece>& profile) {
+  Session& session = console.session();
+  const std::uint8_t mask = mask_of(axis);
+  Live live(mask);
+  Driven driven;
+  {
+    Armed armed(session, mask);
+    driven = drive(session, mask, profile, [&](const wire::State& state, double time_s) {
+      if (!console.options.json) live.show(state, time_s);
+    });
+  }
+  std::string text = fmt::format("Done in {:.2f} s and disarmed: peak current {:.1f} A, core {:.1f} to {:.1f} degC",
+                                 driven.seconds, driven.peak_A, driven.start_degC, driven.end_degC);
+  if (driven.peak_degC > driven.end_degC + 0.5f) text += fmt::format(" (peak {:.1f})", driven.peak_degC);
+  text += ".\n";
+  if (driven.held_back_s > 0.02) {
+    const wire::CodeText why = wire::text_of(driven.limit);
+    text +=
+        fmt::format("Held back for {:.2f} s, at last because {}; {}.\n", driven.held_back_s, why.happened, why.advice);
+  }
+  console.say(text, json_of(driven));
+}
+
+/// Armed at a steady current until Ctrl-C or for so long.
+void arm(Console& console, const std::string& axis, float iq_A, float seconds) {
+  console.tell(fmt::format("Armed at {:g} A; Ctrl-C disarms.", iq_A));
+  play(console, axis, {{iq_A, seconds}});
+}
+
+void stop(Console& console, const std::string& axis) {
+  console.session().disarm(mask_of(axis));
+  console.say(fmt::format("Disarmed: {}.\n", axis == "both" ? "both axes" : "axis " + axis), {{"disarmed", axis}});
+}
+
+void calibrate(Console& console, const std::string& axis) {
+  std::string text;
+  Json json = Json::object();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask_of(axis) >> a & 1) == 0) continue;
+    const wire::Offsets offsets = console.session().calibrate(a);
+    text += fmt::format("axis {}: the current sensors' offsets are {:.3f}, {:.3f}, {:.3f} A\n", a, offsets.phase_A[0],
+                        offsets.phase_A[1], offsets.phase_A[2]);
+    json[fmt::format("axis{}", a)] = {{"offset_A", offsets.phase_A}};
+  }
+  console.say(text, json);
+}
+
+void fault(Console& console, const std::string& axis, bool clear) {
+  std::string text;
+  Json json = Json::object();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask_of(axis) >> a & 1) == 0) continue;
+    const wire::FaultEvidence evidence = console.session().fault(a);
+    const wire::CodeText code = wire::text_of(evidence.fault);
+    const std::string sentence = fault_sentence(evidence);
+    text += fmt::format("axis {}: {}.\n", a, sentence.empty() ? "no fault" : sentence);
+    json[fmt::format("axis{}", a)] = {{"fault", code.name},
+                                      {"happened", code.happened},
+                                      {"value", number(evidence.value)},
+                                      {"threshold", number(evidence.threshold)},
+                                      {"unit", code.unit},
+                                      {"age_s", number(evidence.age_s)},
+                                      {"advice", code.advice}};
+    if (!clear || evidence.fault == 0) continue;
+    const auto one = static_cast<std::uint8_t>(1 << a);
+    console.session().exchange({one, {}, {0, 0}, {0, 0}});  // only a zero setpoint may stand when a fault is cleared
+    console.session().clear(one);
+    text += "        cleared; the axis is off.\n";
+    json[fmt::format("axis{}", a)]["cleared"] = true;
+  }
+  console.say(text, json);
+}
+
+void ask(Console& console, const std::string& axis, const std::string& course) {
+  std::vector<wire::Segment> segments;
+  for (const Piece& piece : profile_in(course, wire::max_segments))
+    segments.push_back({piece.seconds, piece.current_A});
+  const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
+  std::string text;
+  if (outlook.feasible != 0) {
+    text = fmt::format("Yes: the hottest winding would reach {:.1f} degC.\n", outlook.peak_degC);
+  } else {
+    text = fmt::format("Not in full: {:.0f} % would be delivered; the limit is met after {:.2f} s",
+                       100 * outlook.delivered_share, outlook.limits_after_s);
+    text += std::isfinite(outlook.peak_degC)
+                ? fmt::format(" (unlimited, the winding would reach {:.0f} degC).\n", outlook.peak_degC)
+                : ".\n";
+    text += std::isfinite(outlook.wait_s) ? fmt::format("Rest for {:.1f} s first and it fits.\n", outlook.wait_s)
+                                          : "No rest makes it fit; ask for less.\n";
+  }
+  console.say(text, {{"feasible", outlook.feasible != 0},
+                     {"peak_degC", number(outlook.peak_degC)},
+                     {"limits_after_s", number(outlook.limits_after_s)},
+                     {"wait_s", number(outlook.wait_s)},
+                     {"delivered_share", number(outlook.delivered_share)}});
+}
+
+}  // namespace
+
+void add_motion(CLI::App& app, Console& console) {
+  struct Arguments {
+    std::string axis, course;
+    float iq_A = 0, seconds = 1e9f;
+    bool clear = false;
+  };
+  const auto with_axis = [&](CLI::App* command, const std::string& otherwise, bool both) {
+    auto a = std::make_shared<Arguments>();
+    a->axis = otherwise;
+    command->add_option("--axis", a->axis, both ? "0, 1 or both" : "0 or 1")
+        ->capture_default_str()
+        ->check(both ? CLI::IsMember({"0", "1", "both"}) : CLI::IsMember({"0", "1"}));
+    return a;
+  };
+
+  CLI::App* command = app.add_subcommand("arm", "hold an axis armed at a steady current until Ctrl-C");
+  auto a = with_axis(command, "0", true);
+  command->add_option("--iq", a->iq_A, "amperes")->capture_default_str();
+  command->add_option("--seconds", a->seconds, "disarm by itself after so long");
+  command->callback([&console, a] { arm(console, a->axis, a->iq_A, a->seconds); });
+
+  command = app.add_subcommand("run", "arm, play a course of current, disarm");
+  a = with_axis(command, "0", true);
+  command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\"")->required();
+  command->callback([&console, a] { play(console, a->axis, profile_in(a->course, 1000)); });
+
+  command = app.add_subcommand("stop", "disarm");
+  a = with_axis(command, "both", true);
+  command->callback([&console, a] { stop(console, a->axis); });
+
+  command = app.add_subcommand("calibrate", "learn the current sensors' offsets at rest");
+  a = with_axis(command, "both", true);
+  command->callback([&console, a] { calibrate(console, a->axis); });
+
+  command = app.add_subcommand("fault", "what happened, the evidence, and what to do");
+  a = with_axis(command, "both", true);
+  command->add_flag("--clear", a->clear, "clear it; the axis stays off until armed");
+  command->callback([&console, a] { fault(console, a->axis, a->clear); });
+
+  command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
+  a = with_axis(command, "0", false);
+  command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
+  command->callback([&console, a] { ask(console, a->axis, a->course); });
+}
+
+}  // namespace console

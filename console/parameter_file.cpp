@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include "console/parameter_file.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <cmath>
+
+#include "wire/crc.hpp"
+#include "wire/pc/toml_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace console {
+namespace {
+
+using wire::pc::Exit;
+using wire::pc::UserError;
+
+constexpr const char* common = "common";
+
+std::string section_of(std::uint8_t axis) { return axis == wire::no_axis ? common : fmt::format("axis{}", axis); }
+
+}  // namespace
+
+std::string parameter_file(const Session& session, const std::vector<Target>& targets,
+                           const std::vector<float>& values) {
+  const wire::Hello& hello = session.hello();
+  std::string text = fmt::format(
+      "# Parameters of a hotcore board. 'hotcore restore THIS_FILE' puts them in force, 'hotcore diff THIS_FILE' "
+      "compares.\n"
+      "[board]\nname = \"{}\"\nserial = \"{}\"\nfirmware = \"{}\"\ndictionary = \"{:08x}\"\nparameters = \"{:08x}\"\n",
+      hello.board, hello.serial, hello.firmware, hello.dictionary_hash, hash_of(targets, values));
+  std::string section;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    if (section_of(targets[i].axis) != section) {
+      section = section_of(targets[i].axis);
+      text += fmt::format("\n[{}]\n", section);
+    }
+    const Description& what = *targets[i].what;
+    // Nine digits bring a float back bit by bit; fmt's shortest form does too.
+    const std::string value = std::isnan(values[i]) ? "nan" : fmt::format("{}", values[i]);
+    text += fmt::format("{:<32} # {:g} to {:g}: {}\n", fmt::format("{} = {}", full_name(what), value), what.min,
+                        what.max, what.doc);
+  }
+  return text;
+}
+
+std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary) {
+  const toml::table file = wire::pc::parse_toml(path);
+  std::vector<Assignment> assignments;
+  for (const auto& [section_key, section] : file) {
+    const std::string name(section_key.str());
+    if (name == "board") continue;
+    if (!section.is_table()) {
+      throw UserError(Exit::usage,
+                      fmt::format("{}: '{}' stands outside [axis0], [axis1] and [common]; move it there.", path, name));
+    }
+    for (const auto& [key, node] : *section.as_table()) {
+      const std::string full = name == common ? std::string(key.str()) : name + "." + std::string(key.str());
+      const auto value = node.value<double>();
+      if (!value) throw UserError(Exit::usage, fmt::format("{}: {} is no number; repair it.", path, full));
+      const std::vector<Target> targets = dictionary.named(full);
+      assignments.push_back({targets.front(), static_cast<float>(*value)});
+      if (!std::isnan(*value)) check(assignments.back(), path + ": ");
+    }
+  }
+  if (assignments.empty())
+    throw UserError(Exit::usage, path + ": no parameter in it; 'hotcore backup FILE' writes such a file.");
+  return assignments;
+}
+
+void check(const Assignment& assignment, const std::string& where) {
+  const Description& what = *assignment.target.what;
+  const float value = assignment.value;
+  if (!(value >= what.min && value <= what.max)) {
+    throw UserError(Exit::usage, fmt::format("{}{} = {:g} is out of range; it may be {:g} to {:g}{}.", where,
+                                             full_name(assignment.target), value, what.min, what.max,
+                                             what.unit.empty() || what.unit == "count" ? "" : " " + what.unit));
+  }
+  if (what.whole_number && value != std::floor(value)) {
+    throw UserError(Exit::usage,
+                    fmt::format("{}{} = {:g} must be a whole number.", where, full_name(assignment.target), value));
+  }
+}
+
+std::uint32_t hash_of(const std::vector<Target>& targets, const std::vector<float>& values) {
+  std::uint32_t crc = 0xFFFF'FFFFu;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const wire::Assignment entry{{targets[i].what->id, targets[i].axis}, values[i]};
+    std::uint8_t bytes[sizeof entry];
+    std::memcpy(bytes, &entry, sizeof entry);
+    crc = wire::crc32(bytes, sizeof bytes, crc);
+  }
+  return ~crc;
+}
+
+}  // namespace console

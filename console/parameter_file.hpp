@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Parameters of a board as a file that people read and edit (TOML): [board] says whose they are, [axis0], [axis1] and
+// [common] hold "name_unit = value". NaN (unset) is written as nan.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "console/session.hpp"
+
+namespace console {
+
+/// The whole file for the values in force.
+std::string parameter_file(const Session& session, const std::vector<Target>& targets,
+                           const std::vector<float>& values);
+
+/// What a file assigns, checked against what the board declares: a name that it does not have, a value outside its
+/// range or no number is refused with the file, the name and what would be right (UserError, usage). Nothing is sent.
+std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary);
+
+/// Throws UserError (usage) unless the value fits the range that the board declares.
+void check(const Assignment& assignment, const std::string& where);
+
+/// CRC-32 over ids, axes and values: two boards with the same hash run the same parameters.
+std::uint32_t hash_of(const std::vector<Target>& targets, const std::vector<float>& values);
+
+}  // namespace console

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#include <editline/readline.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <iostream>
+
+#include "console/commands.hpp"
+
+namespace console {
+namespace {
+
+Console* completing = nullptr;  // libedit's callbacks take no context
+
+/// Asked again and again for the next word.
+char* next_word(const char* word, int state) {
+  static std::vector<std::string> words;
+  if (state == 0) {
+    words = completions(*completing, std::string(rl_line_buffer).substr(0, static_cast<std::size_t>(rl_point)), word);
+    std::reverse(words.begin(), words.end());
+  }
+  if (words.empty()) return nullptr;
+  char* copy = strdup(words.back().c_str());
+  words.pop_back();
+  return copy;
+}
+
+char** complete(const char* word, int, int) {
+  rl_attempted_completion_over = 1;  // no file names
+  return rl_completion_matches(word, next_word);
+}
+
+/// False at the end of input.
+bool read_line(std::string& line) {
+  if (isatty(STDIN_FILENO) == 0) return static_cast<bool>(std::getline(std::cin, line));
+  char* typed = readline("hotcore> ");
+  if (typed == nullptr) return false;
+  line = typed;
+  if (!line.empty()) add_history(typed);
+  std::free(typed);
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::string> completions(Console& console, const std::string& line, const std::string& word) {
+  std::vector<std::string> known;
+  const std::string before = line.substr(0, line.size() - std::min(line.size(), word.size()));
+  if (before.find_first_not_of(' ') == std::string::npos) {
+    CLI::App app;
+    add_commands(app, console);
+    for (const CLI::App* command : app.get_subcommands({})) known.push_back(command->get_name());
+    known.push_back("quit");
+  } else {
+    const std::string command =
+        before.substr(before.find_first_not_of(' '), before.find(' ', before.find_first_not_of(' ')));
+    try {
+      const bool signals =
+          command.rfind("watch", 0) == 0 || command.rfind("log", 0) == 0 || command.rfind("capture", 0) == 0;
+      if (signals)
+        known = console.session().signals().names();
+      else if (command.rfind("get", 0) == 0 || command.rfind("set", 0) == 0)
+        known = console.session().parameters().names();
+      if (command.rfind("set", 0) == 0) {
+        for (std::string& name : known) name += "=";
+      }
+    } catch (const UserError&) {
+      return {};  // no board, no names; the command itself will say so
+    }
+  }
+  std::erase_if(known, [&](const std::string& name) { return name.rfind(word, 0) != 0; });
+  return known;
+}
+
+int prompt(Console& console) {
+  completing = &console;
+  rl_readline_name = "hotcore";
+  rl_attempted_completion_function = complete;
+  rl_completer_word_break_characters = const_cast<char*>(" \t");
+  if (isatty(STDIN_FILENO) != 0)
+    fmt::print("Connected to {}. TAB completes, 'help' lists the commands, Ctrl-D ends.\n", console.session().name());
+  const Options usual = console.options;
+  int code = 0;
+  for (std::string line; read_line(line);) {
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first == std::string::npos || line[first] == '#') continue;
+    if (line.substr(first) == "quit" || line.substr(first) == "exit") break;
+    if (line.substr(first) == "help") line = "--help";
+    forget_interrupt();
+    console.options = usual;
+    code = run_line(console, [&](CLI::App& app) { app.parse(line); });
+  }
+  return code;
+}
+
+}  // namespace console
