@@ -44,7 +44,7 @@ std::vector<std::string> Dictionary::names() const {
   return names;
 }
 
-std::vector<Target> Dictionary::named(const std::string& name) const {
+std::vector<Target> Dictionary::named(const std::string& name, const std::string& where) const {
   const bool open = !name.empty() && name.back() == '*';
   const std::string start = open ? name.substr(0, name.size() - 1) : name;
   const auto fits = [&](const std::string& full) { return open ? full.rfind(start, 0) == 0 : full == name; };
@@ -53,9 +53,11 @@ std::vector<Target> Dictionary::named(const std::string& name) const {
     if (fits(full_name(target)) || fits(full_name(*target.what))) found.push_back(target);
   }
   if (found.empty()) {
-    throw wire::pc::UserError(wire::pc::Exit::usage, fmt::format("The board has no {} '{}'{}; 'hotcore {}' lists them.",
-                                                                 kind_, name, wire::pc::did_you_mean(name, names()),
-                                                                 kind_ == "signal" ? "signals" : "get"));
+    const std::string hint = wire::pc::did_you_mean(name, names());
+    throw wire::pc::UserError(
+        wire::pc::Exit::usage,
+        fmt::format("{}he board has no {} '{}'{} 'hotcore {}' lists them.", where.empty() ? "T" : where + ": t", kind_,
+                    name, hint.empty() ? ";" : hint, kind_ == "signal" ? "signals" : "get"));
   }
   return found;
 }

@@ -33,8 +33,8 @@ class Dictionary {
   const std::vector<Description>& entries() const { return entries_; }
   /// Every target there is, axis by axis.
   std::vector<Target> all() const;
-  /// What a name stands for, at least one. Throws UserError (usage), naming the nearest.
-  std::vector<Target> named(const std::string& name) const;
+  /// What a name stands for, at least one. Throws UserError (usage), naming the nearest and `where` it stood.
+  std::vector<Target> named(const std::string& name, const std::string& where = "") const;
   /// "axis1.current_limit_A (A, 0 to 100)" for a sentence; of what is not declared, its number.
   std::string told(std::uint16_t id, std::uint8_t axis) const;
   /// Every full name, with and without the axis: for completion.

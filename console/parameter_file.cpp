@@ -5,6 +5,7 @@
 #include <toml++/toml.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "wire/crc.hpp"
 #include "wire/pc/toml_file.hpp"
@@ -46,6 +47,8 @@ std::string parameter_file(const Session& session, const std::vector<Target>& ta
 }
 
 std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary) {
+  if (!std::filesystem::is_regular_file(path))
+    throw UserError(Exit::usage, path + ": there is no such file; check the path, or write one with 'hotcore backup'.");
   const toml::table file = wire::pc::parse_toml(path);
   std::vector<Assignment> assignments;
   for (const auto& [section_key, section] : file) {
@@ -59,7 +62,7 @@ std::vector<Assignment> read_parameter_file(const std::string& path, const Dicti
       const std::string full = name == common ? std::string(key.str()) : name + "." + std::string(key.str());
       const auto value = node.value<double>();
       if (!value) throw UserError(Exit::usage, fmt::format("{}: {} is no number; repair it.", path, full));
-      const std::vector<Target> targets = dictionary.named(full);
+      const std::vector<Target> targets = dictionary.named(full, path);
       assignments.push_back({targets.front(), static_cast<float>(*value)});
       if (!std::isnan(*value)) check(assignments.back(), path + ": ");
     }

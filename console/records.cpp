@@ -172,10 +172,12 @@ void capture(Console& console, const CaptureArguments& a) {
     const Target trigger = session.signals().named(a.trigger).front();
     order.trigger = {static_cast<std::uint8_t>(trigger.what->id), trigger.axis};
   }
-  const std::size_t most_rows = session.hello().capture_words / (signals.size() + 1);  // one word a row is its time stamp
+  const std::size_t most_rows =
+      session.hello().capture_words / (signals.size() + 1);  // one word a row is its time stamp
   if (std::size_t{a.pre} + a.post > most_rows) {
-    throw UserError(Exit::usage, fmt::format("{} rows of {} signals do not fit the board; at most {} rows, or fewer signals.",
-                                             a.pre + a.post, signals.size(), most_rows));
+    throw UserError(Exit::usage,
+                    fmt::format("{} rows of {} signals do not fit the board; at most {} rows, or fewer signals.",
+                                a.pre + a.post, signals.size(), most_rows));
   }
   session.capture(order, signals);
   wire::CaptureStatus status = session.capture_status();

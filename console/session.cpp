@@ -47,7 +47,7 @@ std::size_t most(std::size_t bytes_each) { return (wire::max_payload - sizeof(wi
 Session::Session(std::unique_ptr<link::Transport> transport) : board_(std::move(transport)) {
   name_ = "the board";
   const auto hello = link::hello_in(request(Kind::hello, {}, "say what it is"));
-  if (!hello) misread("what it is");
+  if (!hello) misread("say what it is");
   hello_ = *hello;
   if (hello_.protocol != wire::protocol_version) {
     throw UserError(Exit::wrong_version, fmt::format("The board's firmware speaks protocol {} and this program {}; {}.",
@@ -119,7 +119,7 @@ void Session::refuse(const wire::Answer& answer, const std::string& what) {
   std::string whose;
   if (answer.id != 0 && parameters_)
     whose = parameters_->told(answer.id, answer.axis) + ": ";
-  else if (answer.axis < wire::axis_count)
+  else if (answer.axis < wire::axis_count && what.find("axis") == std::string::npos)
     whose = fmt::format("axis {}: ", answer.axis);
   throw UserError(Exit::refused, fmt::format("{} refused to {}: {}{}; {}.", name_, what, whose, reason, advice));
 }

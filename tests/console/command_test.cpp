@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: MIT
+// Every command as a person types it, against a board made of a script.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "console/commands.hpp"
+#include "console/plot.hpp"
+#include "console/profile.hpp"
+#include "tests/console/fake_board.hpp"
+
+namespace {
+
+using wire::Kind;
+
+class Commands : public testing::Test {
+ protected:
+  struct Said {
+    int code;
+    std::string out, err;
+  };
+
+  Said say(const std::string& line) {
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    console_.options.json = false;
+    const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("--sim " + line); });
+    return {code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
+  }
+  nlohmann::json json(const std::string& line) {
+    const Said said = say(line + " --json");
+    EXPECT_EQ(said.code, 0) << said.err;
+    return nlohmann::json::parse(said.out, nullptr, false);
+  }
+  /// One sentence on standard error, nothing on standard output, the exit code.
+  void refused(const std::string& line, int code, const std::string& words) {
+    const Said said = say(line);
+    EXPECT_EQ(said.code, code) << line << ": " << said.err;
+    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
+    EXPECT_NE(said.err.find(words), std::string::npos) << line << ": " << said.err;
+    EXPECT_EQ(said.out, "") << line;
+    std::printf("  %s: %s", line.c_str(), said.err.c_str());
+  }
+  std::string path(const std::string& name) { return (folder_ / name).string(); }
+  static std::string content(const std::string& path) {
+    std::ifstream in(path);
+    std::stringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+  bool is_empty() const { return std::filesystem::is_empty(folder_); }
+
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("hotcore_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::shared_ptr<FakeBoard> board_ = std::make_shared<FakeBoard>();
+  console::Console console_{[this](const console::Options&) { return std::make_unique<FakeTransport>(board_); }};
+  std::filesystem::path folder_;
+};
+
+// ---- what is right
+// ----------------------------------------------------------------------------------------------------
+
+TEST_F(Commands, GetShowsValueRangeAndMeaning) {
+  const Said said = say("get axis1.current_limit_A");
+  EXPECT_EQ(said.code, 0);
+  EXPECT_NE(said.out.find("axis1.current_limit_A"), std::string::npos);
+  EXPECT_NE(said.out.find("20   0 to 100"), std::string::npos) << said.out;
+  EXPECT_EQ(json("get current_limit_A").size(), 2u);  // both axes
+  EXPECT_EQ(json("get p*").size(), 4u);
+  EXPECT_EQ(json("get").size(), 7u);  // three for each axis, one for the board
+  EXPECT_EQ(json("get fan_delay_s")["fan_delay_s"]["unit"], "s");
+}
+
+TEST_F(Commands, SetChangesWhatItNamesAndNothingElse) {
+  const FakeBoard::Values before = board_->in_force;
+  EXPECT_EQ(say("set axis1.current_limit_A=12").code, 0);
+  FakeBoard::Values expected = before;
+  expected[{0x0111, 1}] = 12.0f;
+  EXPECT_EQ(board_->in_force, expected);
+  EXPECT_EQ(board_->saves, 0);
+  const auto changed = json("set current_limit_A=10 pole_pairs=7 --save")["changed"];
+  EXPECT_EQ(changed.size(), 4u);
+  EXPECT_EQ(changed["axis1.current_limit_A"]["before"], 12.0);
+  EXPECT_EQ(board_->saved, board_->in_force);
+}
+
+TEST_F(Commands, BackupThenRestoreBringsEachBitBack) {
+  board_->in_force[{0x0101, 0}] = 0.1f + 0.2f;
+  board_->in_force[{0x0101, 1}] = std::nextafter(1.0f, 2.0f);
+  const FakeBoard::Values before = board_->in_force;
+  EXPECT_EQ(say("backup " + path("mine.toml")).code, 0);
+  EXPECT_NE(say("diff " + path("mine.toml")).out.find("No difference"), std::string::npos);
+  EXPECT_EQ(say("set current_limit_A=3 phase_resistance_ohm=1").code, 0);
+  EXPECT_EQ(json("diff " + path("mine.toml"))["differences"].size(), 4u);
+  EXPECT_EQ(say("restore " + path("mine.toml")).code, 0);
+  EXPECT_EQ(board_->in_force, before);
+}
+
+TEST_F(Commands, DiffAgainstDefaults) {
+  EXPECT_EQ(json("diff")["differences"].size(), 2u);  // the resistance that has no default, on both axes
+  EXPECT_EQ(say("set axis0.current_limit_A=3").code, 0);
+  EXPECT_EQ(json("diff")["differences"]["axis0.current_limit_A"]["other"], 20.0);
+}
+
+TEST_F(Commands, SaveReachesTheBoard) {
+  EXPECT_TRUE(json("save")["saved"]);
+  EXPECT_EQ(board_->saves, 1);
+}
+
+TEST_F(Commands, RunArmsPlaysAndDisarms) {
+  const auto summary = json("run \"5A 0.2s, 0A 0.1s\" --axis 1");
+  EXPECT_NEAR(summary["seconds"], 0.3, 0.02);
+  EXPECT_EQ(summary["peak_A"], 5.0);
+  EXPECT_NEAR(board_->setpoints, 60, 4);  // 200 a second
+  EXPECT_EQ(board_->armed, 0);
+}
+
+TEST_F(Commands, StopDisarms) {
+  board_->armed = 3;
+  EXPECT_EQ(say("stop").code, 0);
+  EXPECT_EQ(board_->armed, 0);
+}
+
+TEST_F(Commands, AFaultIsToldWithEvidenceAndAdvice) {
+  board_->fault = static_cast<std::uint8_t>(wire::Fault::over_current);
+  board_->evidence = {{}, board_->fault, 0, 0, 31.5f, 30.0f, 2.0f};
+  const std::string out = say("fault --axis 0").out;
+  for (const char* words : {"passed the trip level", "31.5 A", "30 A", "2.0 s ago", "check the motor leads"})
+    EXPECT_NE(out.find(words), std::string::npos) << out;
+  EXPECT_TRUE(json("fault --axis 0 --clear")["axis0"]["cleared"]);
+  EXPECT_EQ(board_->fault, 0);
+}
+
+TEST_F(Commands, AskSaysWhatWouldHappen) {
+  const auto outlook = json("ask \"20A 0.3s, 6A 5s\"");
+  EXPECT_FALSE(outlook["feasible"]);
+  EXPECT_EQ(outlook["wait_s"], 12.5);
+  EXPECT_NE(say("ask \"20A 0.3s\"").out.find("Rest for 12.5 s"), std::string::npos);
+}
+
+TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }
+
+TEST_F(Commands, WatchGivesALineForEachState) {
+  const Said said = say("watch --json --seconds 1 --rate 10");
+  EXPECT_EQ(std::count(said.out.begin(), said.out.end(), '\n'), 11);
+  const Said curves = say("watch axis0.iq_A --seconds 1");
+  EXPECT_NE(curves.out.find("axis0.iq_A 22"), std::string::npos) << curves.out;
+}
+
+TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
+  const auto said = json("log --out " + path("x.csv") + " --seconds 2 --rate 50");
+  EXPECT_NEAR(said["rows"], 101, 1);
+  const std::string text = content(path("x.csv"));
+  EXPECT_NE(text.find("# board: fake FAKE01\n# firmware: 0.1\n# parameters: "), std::string::npos) << text;
+  EXPECT_NE(text.find("\ntime_s,id_A,iq_A,speed_rad_per_s,bus_V,housing_degC,core_a_degC\n"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("\n0.020000,21,22,36,34,91,85\n"), std::string::npos) << text;
+  EXPECT_FALSE(std::filesystem::exists(path("x.csv.part")));
+}
+
+TEST_F(Commands, CaptureWritesRowsAroundItsTrigger) {
+  const auto said =
+      json("capture axis0.iq_A axis1.iq_A --trigger axis0.id_A --edge rising --level 2 --pre 30 --post 70 --out " +
+           path("c.csv"));
+  EXPECT_EQ(said["rows"], 100);
+  const std::string text = content(path("c.csv"));
+  EXPECT_NE(text.find("\n-0.001500,0,0\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n0.003450,99,99\n"), std::string::npos);
+}
+
+TEST_F(Commands, TheListNamesTheSimulatedBoard) { EXPECT_EQ(json("list")[0]["serial"], "FAKE01"); }
+
+TEST_F(Commands, UdevPrintsARule) {
+  EXPECT_NE(say("udev").out.find("ATTR{idVendor}==\"1209\", ATTR{idProduct}==\"0001\""), std::string::npos);
+}
+
+TEST_F(Commands, CompletionKnowsTheBoardsOwnNames) {
+  console_.options.sim = true;
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(console::completions(console_, "ca", "ca"), (Words{"calibrate", "capture"}));
+  EXPECT_EQ(console::completions(console_, "set axis1.cur", "axis1.cur"), Words{"axis1.current_limit_A="});
+  EXPECT_EQ(console::completions(console_, "watch sp", "sp"), Words{"speed_rad_per_s"});
+}
+
+// ---- what is wrong
+// ----------------------------------------------------------------------------------------------------
+
+TEST_F(Commands, AnUnknownParameterGetsTheNearest) {
+  refused("get curent_limit_A", 2, "did you mean 'current_limit_A'");
+  refused("set axis0.current_limt_A=3", 2, "did you mean 'axis0.current_limit_A'");
+  refused("watch axis0.coer_a_degC", 2, "did you mean 'axis0.core_a_degC'");
+}
+
+TEST_F(Commands, AValueOutOfRangeGetsTheRange) {
+  const auto before = board_->in_force;
+  refused("set axis0.current_limit_A=500", 2, "0 to 100 A");
+  refused("set pole_pairs=3.5", 2, "whole number");
+  refused("set pole_pairs=seven", 2, "not a number");
+  refused("set axis0.current_limit_A=12 axis0.pole_pairs=99", 2, "1 to 50");
+  EXPECT_EQ(board_->in_force, before);
+}
+
+TEST_F(Commands, ASetThatContradictsItselfIsRefusedAsAWhole) {
+  const auto before = board_->in_force;
+  refused("set axis0.current_limit_A=90 axis0.phase_resistance_ohm=40", 8, "axis0.current_limit_A (0 to 100 A)");
+  EXPECT_EQ(board_->in_force, before);
+  EXPECT_EQ(say("set axis1.current_limit_A=9").code, 0);  // and nothing of it stays behind
+  EXPECT_EQ(board_->in_force.at({0x0111, 0}), before.at({0x0111, 0}));
+}
+
+TEST_F(Commands, AnotherProtocolIsSaidSo) {
+  board_->protocol = 2;
+  refused("get", 9, "use a newer hotcore");
+  board_->protocol = 0;
+  refused("get", 9, "update the firmware");
+}
+
+TEST_F(Commands, ABoardThatGoesAwayDuringSaveSaysSo) {
+  board_->before = [&](Kind kind) { return kind != Kind::save || !(board_->unplugged = true); };
+  refused("save", 7, "unplugged when asked to save");
+}
+
+TEST_F(Commands, ASilentBoardIsGivenUp) {
+  board_->before = [](Kind kind) { return kind != Kind::save; };
+  refused("save", 7, "no answer when asked to save");
+  EXPECT_EQ(say("get").code, 0);  // the next command looks anew
+}
+
+TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
+  int gets = 0;
+  board_->before = [&](Kind kind) { return kind != Kind::get || !(board_->unplugged = ++gets == 1); };
+  refused("backup " + path("mine.toml"), 7, "check cable and power");
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(Commands, ABackupKeepsTheOldFileWhenItFails) {
+  std::ofstream(path("mine.toml")) << "old";
+  board_->before = [&](Kind kind) { return kind != Kind::get; };
+  refused("backup " + path("mine.toml"), 7, "no answer");
+  EXPECT_EQ(content(path("mine.toml")), "old");
+}
+
+TEST_F(Commands, ABoardThatGoesAwayWhileLoggingLeavesTheRowsUntilThen) {
+  board_->twist = [&](Kind kind, std::vector<std::uint8_t>&) {
+    if (kind == Kind::telemetry && board_->now_s > 1.0) board_->unplugged = true;
+  };
+  const Said said = say("log --out " + path("x.csv") + " --seconds 5 --rate 50");
+  EXPECT_EQ(said.code, 7) << said.err;
+  const std::string text = content(path("x.csv"));
+  EXPECT_GT(std::count(text.begin(), text.end(), '\n'), 40);
+  EXPECT_EQ(text.back(), '\n');
+  EXPECT_FALSE(std::filesystem::exists(path("x.csv.part")));
+}
+
+TEST_F(Commands, ABoardThatTripsEndsTheRunWithItsReason) {
+  int seen = 0;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::setpoint && ++seen == 20) {
+      board_->fault = static_cast<std::uint8_t>(wire::Fault::bus_over_voltage);
+      board_->evidence = {{}, board_->fault, 0, 0, 59.0f, 58.0f, 0.0f};
+    }
+    return true;
+  };
+  const Said said = say("run \"5A 1s\"");
+  EXPECT_EQ(said.code, 8);
+  EXPECT_NE(said.err.find("the bus voltage passed its upper limit: 59 V"), std::string::npos) << said.err;
+  EXPECT_EQ(board_->armed, 0);
+  refused("run \"5A 1s\"", 8, "refused to arm axis 0: the axis has tripped");
+}
+
+TEST_F(Commands, CtrlCDisarms) {
+  int seen = 0;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::setpoint && ++seen == 20) std::raise(SIGINT);
+    return true;
+  };
+  const Said said = say("arm --iq 2");
+  EXPECT_EQ(said.code, 130);
+  EXPECT_EQ(seen, 20);
+  EXPECT_EQ(board_->armed, 0);
+  console::forget_interrupt();
+}
+
+TEST_F(Commands, AnAnswerThatIsCutShortIsNotBelieved) {
+  for (const Kind kind : {Kind::hello, Kind::describe_parameter, Kind::get, Kind::ask, Kind::calibrate, Kind::fault}) {
+    board_ = std::make_shared<FakeBoard>();
+    console_.hang_up();
+    board_->twist = [kind](Kind k, std::vector<std::uint8_t>& payload) {
+      if (k == kind) payload.resize(payload.size() / 2);
+    };
+    const std::string line = kind == Kind::ask         ? "ask \"1A 1s\""
+                             : kind == Kind::calibrate ? "calibrate"
+                             : kind == Kind::fault     ? "fault"
+                                                       : "get";
+    refused(line, 9, "does not understand");
+  }
+}
+
+TEST_F(Commands, FilesThatAreWrongAreNamed) {
+  const auto write = [&](const std::string& text) { std::ofstream(path("p.toml")) << text; };
+  refused("restore " + path("nowhere.toml"), 2, "nowhere.toml: there is no such file");
+  write("[axis0]\ncurrent_limit_A = 500\n");
+  refused("restore " + path("p.toml"), 2, "p.toml: axis0.current_limit_A = 500 is out of range; it may be 0 to 100 A");
+  write("[axis0]\ncurrent_limt_A = 5\n");
+  refused("restore " + path("p.toml"), 2, "p.toml: the board has no parameter 'axis0.current_limt_A', did you mean");
+  write("[axis0]\ncurrent_limit_A = \"much\"\n");
+  refused("restore " + path("p.toml"), 2, "is no number");
+  write("[axis0\n");
+  refused("restore " + path("p.toml"), 2, "p.toml");
+  write("");
+  refused("restore " + path("p.toml"), 2, "no parameter in it");
+}
+
+TEST_F(Commands, WrongCommandLinesGetOneSentence) {
+  refused("run \"5 bananas\"", 2, "no piece of a current profile");
+  refused("run \"5A\"", 2, "no piece");
+  refused("ask \"5A -1s\"", 2, "no piece");
+  refused("arm --axis 2", 2, "--axis");
+  refused("set current_limit_A", 2, "write name=value");
+  refused("capture axis0.iq_A --pre 2000 --post 2000", 2, "at most 1024 rows");
+  refused("log --out /proc/nowhere/x.csv --seconds 1", 2, "cannot be written");
+}
+
+TEST_F(Commands, WithJsonAnErrorIsJsonToo) {
+  const Said said = say("get curent_limit_A --json");
+  EXPECT_EQ(nlohmann::json::parse(said.out)["exit_code"], 2);
+}
+
+// ---- small parts
+// ------------------------------------------------------------------------------------------------------
+
+TEST(Profile, UnitsAreUnderstood) {
+  const auto pieces = console::profile_in("20A 0.3s, -500mA 200 ms,6 2min", 10);
+  ASSERT_EQ(pieces.size(), 3u);
+  EXPECT_FLOAT_EQ(pieces[1].current_A, -0.5f);
+  EXPECT_FLOAT_EQ(pieces[1].seconds, 0.2f);
+  EXPECT_FLOAT_EQ(pieces[2].seconds, 120.0f);
+}
+
+TEST(Plot, AStepIsConnectedAndStaysInsideItsFrame) {
+  const std::string text = console::plot({{"x", {0, 0, 0, 8, 8, 8}}}, 20, 2, 1.0f, false);
+  EXPECT_EQ(text,
+            "       8          \u28B8\u2809\n"
+            "       0         \u28C0\u2878 \n"
+            "         x\n")
+      << text;
+  const float huge = std::numeric_limits<float>::max();
+  for (const std::vector<float>& values : {std::vector<float>{huge, -huge, std::nanf(""), INFINITY}, {}, {0.0f}}) {
+    const std::string shown = console::plot({{"x", values}}, 20, 3, 1.0f, false);
+    EXPECT_EQ(std::count(shown.begin(), shown.end(), '\n'), 4) << shown;
+  }
+}
+
+}  // namespace
