@@ -2,6 +2,7 @@
 #include "firmware/axis.hpp"
 
 #include <cmath>
+#include <new>
 
 #include "thermal/losses.hpp"
 #include "thermal/validate.hpp"
@@ -36,33 +37,74 @@ thermal::GovernorSettings governor_settings(const BoardRating& rating) {
 }
 
 Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating)
-    : core_(usable_or_nothing(setup.heat), setup.estimator),
+    : rating_(rating),
+      core_(usable_or_nothing(setup.heat), setup.estimator),
       governor_(governor_settings(rating)),
       peak_A_(rating.peak_A),
       blind_A_(blind_share * rating.continuous_A),
       blind_cap_A_(rating.peak_A),
       senses_housing_(setup.senses_housing),
       index_(index) {
-  const bool board_ok = plausible(rating) && usable(setup.heat);
-  const Finding found = validate(setup.parameters, rating);
-  if (board_ok && found.id == 0) {
-    const AxisParameters& p = setup.parameters;
-    guard_ = Guard(rating);
-    rotor_ = Rotor(p, rating);
-    setpoint_.configure(p, rating);
-    permit_ = Permit(p, rating);
-    current_loop_ = CurrentLoop(p, rating);
-    usable_ratio_ = std::fmin(1.0f - rating.sampling_window_s * rating.pwm_Hz, full_bus);
-    dead_time_ = DeadTime(rating.dead_time_s, rating.pwm_Hz, p.dead_time_soft_A);
-    // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
-    quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
-    offset_bound_A_ = p.offset_bound_A;
-    inductance_H_ = 0.5f * (p.inductance_d_H + p.inductance_q_H);
-    pwm_Hz_ = rating.pwm_Hz;
-    period_s_ = 1.0f / rating.pwm_Hz;
-    configured_ = true;
-  } else if (!board_ok || !found.missing) {
-    trip({wire::Fault::parameters, index_, found.value, static_cast<float>(found.id), 0.0f});
+  judge(setup);
+  take_over();
+}
+
+void Axis::configure(const AxisSetup& setup) {
+  const thermal::HeatMemory heat = core_.save();
+  new (&core_) thermal::CoreEstimator(usable_or_nothing(setup.heat), setup.estimator);  // too large for the stack
+  core_.restore(heat, 0.0);
+  senses_housing_ = setup.senses_housing;
+  allowance_ = {0.0f, wire::Limit::thermal_late};
+  judge(setup);
+  post(Command::configure);
+}
+
+bool Axis::at_rest() const { return commands_.load() == 0 && (mode_ == Mode::off || mode_ == Mode::tripped); }
+
+void Axis::restore(const AxisMemory& memory) {
+  core_.restore(memory.heat, -1.0);
+  const wire::Fault fault = memory.fault.fault;
+  const bool judged_anew = fault == wire::Fault::parameters || fault == wire::Fault::clock_lost;
+  if (fault != wire::Fault::none && !judged_anew && mode_ == Mode::off) (void)trip(memory.fault);
+}
+
+/// A board or a heat set that cannot be is refused with id 0; a heat set without nodes is one that was never given.
+void Axis::judge(const AxisSetup& setup) {
+  next_ = setup.parameters;
+  finding_ = validate(setup.parameters, rating_);
+  const bool no_heat = setup.heat.node_count == 0;
+  const bool cannot_be = !plausible(rating_) || !(no_heat || usable(setup.heat));
+  if (cannot_be || (finding_.id != 0 && !finding_.missing))
+    next_state_ = SetState::refused;
+  else
+    next_state_ = no_heat || finding_.missing ? SetState::incomplete : SetState::good;
+}
+
+void Axis::take_over() {
+  const AxisParameters& p = next_;
+  configured_ = next_state_ == SetState::good;
+  if (!configured_) {
+    permit_ = {};
+    if (next_state_ == SetState::refused)
+      trip({wire::Fault::parameters, index_, finding_.value, static_cast<float>(finding_.id), 0.0f});
+    return;
+  }
+  guard_ = Guard(rating_);
+  rotor_ = Rotor(p, rating_);
+  setpoint_.configure(p, rating_);
+  permit_ = Permit(p, rating_);
+  current_loop_ = CurrentLoop(p, rating_);
+  usable_ratio_ = std::fmin(1.0f - rating_.sampling_window_s * rating_.pwm_Hz, full_bus);
+  dead_time_ = DeadTime(rating_.dead_time_s, rating_.pwm_Hz, p.dead_time_soft_A);
+  // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
+  quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
+  offset_bound_A_ = p.offset_bound_A;
+  inductance_H_ = 0.5f * (p.inductance_d_H + p.inductance_q_H);
+  pwm_Hz_ = rating_.pwm_Hz;
+  period_s_ = 1.0f / rating_.pwm_Hz;
+  if (fault_.fault == wire::Fault::parameters) {
+    fault_ = {};
+    change(Event::clear);
   }
 }
 
@@ -184,6 +226,7 @@ wire::Status Axis::clear() {
 void Axis::obey() {
   const std::uint8_t posted = commands_.exchange(0);
   const auto asked_for = [posted](Command c) { return (posted & static_cast<std::uint8_t>(c)) != 0; };
+  if (asked_for(Command::configure)) take_over();
   if (asked_for(Command::disarm)) change(Event::disarm);
   if (asked_for(Command::clear) && setpoint_.is_zero() && fault_.fault != wire::Fault::parameters) {
     if (mode_ == Mode::tripped) fault_ = {};

@@ -43,6 +43,12 @@ struct AxisSetup {
   bool senses_housing = true;  // false: model alone. true and no reading: at most 60 % of the continuous current
 };
 
+/// What must survive a reset.
+struct AxisMemory {
+  thermal::HeatMemory heat;
+  FaultRecord fault;
+};
+
 /// What the last fast tick saw and did: for telemetry and the slow lane.
 struct FastView {
   Dq current_A;    // measured
@@ -76,6 +82,20 @@ class Axis {
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
 
+  /// Another set for a disarmed axis. The temperatures stay; the fast lane takes it over at its next tick.
+  void configure(const AxisSetup& setup);
+  /// Off or tripped, and nothing posted that could change that.
+  bool at_rest() const;
+
+  /// What must survive a reset, as of the last slow tick.
+  AxisMemory memory() const { return {core_.save(), fault()}; }
+  /// Before the control interrupt runs. Time in reset is unknown: nothing has cooled. A fault stays latched.
+  void restore(const AxisMemory& memory);
+  /// The same without a memory: hot until something proves otherwise.
+  void start_hot() { core_.start_hot(); }
+  /// Before the control interrupt runs: stays tripped, for this reason.
+  void hold(const FaultRecord& why) { (void)trip(why); }
+
   /// Control interrupt, every PWM period, also while off: the duty for the next period.
   [[nodiscard]] hal::Duty tick(const hal::AxisSample& sample) noexcept;
 
@@ -108,10 +128,12 @@ class Axis {
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
 
-  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4 };
+  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   wire::Status against_arming() const;
+  void judge(const AxisSetup& setup);
+  void take_over();
   [[gnu::noinline]] void obey();
   [[gnu::noinline]] hal::Duty unseen(Verdict verdict);
   [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
@@ -128,6 +150,12 @@ class Axis {
   Allowance allowance_{0.0f, wire::Limit::thermal_late};
 
   std::atomic<std::uint8_t> commands_{0};  // posted, for the next tick
+  BoardRating rating_;
+  // What `configure` brought, until the fast lane has taken it over.
+  enum class SetState : std::uint8_t { incomplete, refused, good };
+  AxisParameters next_;
+  SetState next_state_ = SetState::incomplete;
+  Finding finding_{};
 
   // Fast lane, in the order of the walk.
   Guard guard_;

@@ -16,6 +16,16 @@ Driver::Driver(const DriverSetup& setup)
       board_heat_(heat_of(setup)),
       axes_{{0, setup.axes[0], setup.rating}, {1, setup.axes[1], setup.rating}} {}
 
+void Driver::restore(const DriverMemory& memory) {
+  for (int i = 0; i < axis_count; ++i) axes_[i].restore(memory.axes[i]);
+  board_heat_.restore(memory.board_used_ratio);
+}
+
+void Driver::start_hot() {
+  for (Axis& axis : axes_) axis.start_hot();
+  board_heat_.restore(1.0f);
+}
+
 void Driver::slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]) {
   const double used_A2[axis_count] = {axes_[0].current2_A2(), axes_[1].current2_A2()};  // of the last slow tick
   board_heat_.tick(used_A2[0], used_A2[1], {board.power_stage.value_degC, board.power_stage.valid});

@@ -17,12 +17,29 @@ struct DriverSetup {
   thermal::BoardRating board_heat{};  // its continuous current is taken from the rating
 };
 
+/// What must survive a reset: how hot everything was, and why it stopped.
+struct DriverMemory {
+  AxisMemory axes[axis_count];
+  float board_used_ratio;
+};
+
 class Driver {
  public:
   explicit Driver(const DriverSetup& setup);
 
   Axis& axis(int index) { return axes_[index]; }
   const Axis& axis(int index) const { return axes_[index]; }
+
+  /// Both axes off or tripped, and nothing posted that could change that.
+  bool at_rest() const { return axes_[0].at_rest() && axes_[1].at_rest(); }
+  /// Another set for a disarmed axis.
+  void configure(int index, const AxisSetup& setup) { axes_[index].configure(setup); }
+
+  /// What must survive a reset, as of the last slow tick.
+  DriverMemory memory() const { return {{axes_[0].memory(), axes_[1].memory()}, board_heat_.used_ratio()}; }
+  /// Before the control interrupt runs: once, either with what was remembered or as hot as may be.
+  void restore(const DriverMemory& memory);
+  void start_hot();
 
   /// Every 10 ms, from one context below the control interrupt.
   void slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]);

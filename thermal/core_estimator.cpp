@@ -26,6 +26,7 @@ constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached 
 constexpr float enough_movement_K = 3.0f, alive_share = 0.5f, stuck_share = 0.25f;
 constexpr float start_sigma_K = 15.0f;
 constexpr float restored_hotter_K = 10.0f;
+constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
 // Drift of the ambient: 10 K in 20 min, at most 10 K off while it is observed; it also takes up cooling that differs
 // from the sheet's. Of any node: 0.1 K in a second's square root, what no parameter explains.
@@ -216,16 +217,17 @@ void CoreEstimator::hear_housing(Reading housing) {
   }
   reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
   reading_moved_K_ = reading_degC - reading_slow_degC_;
-  correct_by_housing(innovation_K);
+  correct_by_housing(reading_degC, innovation_K);
 }
 
-void CoreEstimator::correct_by_housing(float innovation_K) {
+void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
   Row seen = Row::Zero(n_ + 5);
   seen[sensor()] = 1.0f;
   const float noise = squared(settings_.housing_noise_K);
   if (!acquired_) {
     acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity(), 1);
     trusted_ambient_degC_ = ambient_degC_;
+    if (acquired_) raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + noise);
@@ -355,23 +357,65 @@ void CoreEstimator::raise_to(float winding_degC) {
   publish();
 }
 
-void CoreEstimator::save(float (&rise_K)[max_nodes]) const {
-  for (int i = 0; i < max_nodes; ++i) rise_K[i] = i < n_ ? static_cast<float>(degC_[i] - ambient_degC_) : 0.0f;
+HeatMemory CoreEstimator::save() const {
+  HeatMemory memory{n_, {}, {}, static_cast<float>(ambient_degC_)};
+  for (int i = 0; i < n_; ++i) {
+    memory.degC[i] = static_cast<float>(degC_[i]);
+    memory.sigma_K[i] = std::sqrt(p_(i, i));
+  }
+  return memory;
 }
 
-void CoreEstimator::restore(const float (&rise_K)[max_nodes], double off_s) {
+void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
+  if (memory.node_count != n_) return start_hot();
   const double believed = static_cast<double>(settings_.ambient_degC);
-  if (!(ambient_degC_ > believed)) ambient_degC_ = believed;
-  const double full_rise_K = 120.0 > believed ? 155.0 - believed : 120.0;
+  const double saved_ambient = static_cast<double>(memory.ambient_degC);
+  ambient_degC_ = plausible(saved_ambient) && saved_ambient > believed ? saved_ambient : believed;
+  const double hottest = hottest_limit_degC();
   Vector rise(n_);
+  float sigma_K[max_nodes];
   for (int i = 0; i < n_; ++i) {
-    const bool good = plausible(static_cast<double>(rise_K[i]));
-    const double limit_K = std::isfinite(max_degC_[i]) ? static_cast<double>(max_degC_[i]) - believed : full_rise_K;
-    rise[i] = good ? static_cast<double>(rise_K[i]) : limit_K;
+    const double saved = static_cast<double>(memory.degC[i]);
+    const double limit = std::isfinite(max_degC_[i]) ? static_cast<double>(max_degC_[i]) : hottest;
+    rise[i] = (plausible(saved) ? saved : limit) - ambient_degC_;
     if (!(rise[i] > 0.0)) rise[i] = 0.0;
+    sigma_K[i] = memory.sigma_K[i] >= 0.0f && memory.sigma_K[i] < 100.0f ? memory.sigma_K[i] : start_sigma_K;
   }
   if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
   degC_ = rise.array() + ambient_degC_;
+  double sum_degC = 0.0;
+  int windings = 0;
+  for (int i = 0; i < n_; ++i) {
+    if (!std::isfinite(max_degC_[i])) continue;
+    sum_degC += degC_[i];
+    ++windings;
+  }
+  begin_anew(sigma_K);
+  if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+}
+
+void CoreEstimator::start_hot() {
+  const double hot = hottest_limit_degC() - static_cast<double>(unknown_below_K);
+  ambient_degC_ = static_cast<double>(settings_.ambient_degC);
+  degC_ = Vector::Constant(n_, hot > ambient_degC_ ? hot : ambient_degC_);
+  float sigma_K[max_nodes];
+  for (float& s : sigma_K)
+    s = settings_.margin_sigmas > 0.0f ? unknown_below_K / settings_.margin_sigmas : start_sigma_K;
+  begin_anew(sigma_K);
+}
+
+/// The lowest limit of the windings; without one, class F's 155 degC.
+double CoreEstimator::hottest_limit_degC() const {
+  float lowest = 155.0f;
+  for (int i = 0; i < n_; ++i) {
+    if (max_degC_[i] < lowest) lowest = max_degC_[i];
+  }
+  return static_cast<double>(lowest);
+}
+
+/// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of the
+/// heat they get (the worst case: it will grow the same way), and for one that the housing does not show.
+void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   sensor_degC_ = degC_[housing_.node];
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
@@ -381,6 +425,14 @@ void CoreEstimator::restore(const float (&rise_K)[max_nodes], double off_s) {
   due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = 0.0f;
   widen_all();
+  const int power = n_ + 2;
+  for (int i = 0; i < n_; ++i) {
+    if (i == housing_.node) continue;
+    for (int j = 0; j < n_; ++j) {
+      if (j != housing_.node) p_(i, j) = sigma_K[i] * sigma_K[j];
+    }
+    p_(i, power) = p_(power, i) = sigma_K[i] * settings_.trust.power;
+  }
   p_(sensor(), sensor()) = p_(housing_.node, housing_.node);  // the sensor is as warm as what it sits on
   p_(sensor(), housing_.node) = p_(housing_.node, sensor()) = p_(housing_.node, housing_.node);
   publish();

@@ -65,6 +65,13 @@ struct Estimate {
   double hottest_degC() const;
 };
 
+/// The estimator's state as it is kept in backup memory.
+struct HeatMemory {
+  std::int32_t node_count;
+  float degC[max_nodes], sigma_K[max_nodes];
+  float ambient_degC;
+};
+
 class CoreEstimator {
  public:
   using Vector = HeatNetwork<double>::Vector;
@@ -84,11 +91,16 @@ class CoreEstimator {
   /// The host knows better only upwards.
   void raise_to(float winding_degC);
 
-  /// Rises over ambient to keep in backup memory, K.
-  void save(float (&rise_K)[max_nodes]) const;
-  /// After a reset. A time off that is negative or NaN is unknown: then all of the saved rise counts, on an ambient of
-  /// at least the one believed. A rise that is not finite counts as the full rise to the node's limit.
-  void restore(const float (&rise_K)[max_nodes], double off_s);
+  /// What must survive a reset: of the last tick.
+  HeatMemory save() const;
+  /// After a reset. A time off that is negative or NaN is unknown: then nothing has cooled. The ambient is at least the
+  /// one believed; each winding is at least as warm as the mean of them, which they may have reached meanwhile, and as
+  /// the first housing reading. What is not a temperature counts as the node's limit; another number of nodes as
+  /// nothing known, see start_hot.
+  void restore(const HeatMemory& memory, double off_s);
+  /// After a reset of which nothing is known: every node 10 K below the winding's limit, and that with the margin on
+  /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise.
+  void start_hot();
 
   const Estimate& estimate() const { return estimate_; }
   /// How much faster T + k sigma rises than T when heat is poured in.
@@ -103,11 +115,13 @@ class CoreEstimator {
   using Row = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_states, 1>;
 
   void widen_all();
+  double hottest_limit_degC() const;
+  void begin_anew(const float (&sigma_K)[max_nodes]);
   bool take_input(const HeatInput<>& input);
   void step();
   void propagate_covariance(const HeatNetwork<double>::Rates& rates);
   void hear_housing(Reading housing);
-  void correct_by_housing(float innovation_K);
+  void correct_by_housing(float reading_degC, float innovation_K);
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps);

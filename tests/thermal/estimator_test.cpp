@@ -299,11 +299,10 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
   const auto set = thermal::three_phase_set(reference::ec16());
   CoreEstimator before(set, {});
   for (int i = 0; i < 6000; ++i) before.tick(current(5), missing);
-  float rise_K[thermal::max_nodes];
-  before.save(rise_K);
+  thermal::HeatMemory memory = before.save();
   auto after = [&](double off_s) {
     CoreEstimator core(set, {});
-    core.restore(rise_K, off_s);
+    core.restore(memory, off_s);
     return core.estimate().hottest_degC();
   };
   EXPECT_NEAR(after(nan), before.estimate().hottest_degC(), 1e-4);
@@ -311,15 +310,14 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
   EXPECT_LT(after(1.0), before.estimate().hottest_degC() - 1);
   EXPECT_GT(after(1.0), before.estimate().housing_degC);
   EXPECT_NEAR(after(1e5), 40.0, 0.01);
-  rise_K[0] = std::nanf("");
+  memory.degC[0] = std::nanf("");
   EXPECT_NEAR(after(nan), 155.0, 1e-3) << "a torn record counts as a motor at its limit";
 }
 
 TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
   const auto set = thermal::three_phase_set(reference::ec16());
-  float rise_K[thermal::max_nodes] = {80, 80, 80, 60};
   CoreEstimator core(set, {});
-  core.restore(rise_K, nan);
+  core.restore({4, {120, 120, 120, 100}, {5, 5, 5, 5}, 30}, nan);
   EXPECT_NEAR(core.estimate().hottest_degC(), 120.0, 1e-6);
   for (int i = 0; i < 60; ++i) core.tick({}, at_25);
   EXPECT_GT(core.estimate().hottest_degC(), 50.0) << "the winding itself is not seen by the housing";

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// The parameters of both axes: what is in force, what is staged, what is saved. Whoever speaks to a person (USB, the
+// debugger's door, a test) calls these functions and no others:
+//
+//   stage one by one -> commit: checked as a whole, then in force -> save: in force, to flash, read back
+//
+// Commit and save are refused unless both axes are disarmed. Hardware limits are the board's (BoardRating) and stand in
+// no dictionary. A saved set that contradicts itself or comes from a newer firmware is not used. One context below the
+// control interrupt, the one that arms; not for an ISR.
+#pragma once
+
+#include "firmware/driver.hpp"
+#include "firmware/heat_parameters.hpp"
+#include "firmware/record_log.hpp"
+#include "wire/protocol.hpp"
+
+namespace firmware {
+
+struct AxisSet {
+  AxisParameters drive;
+  HeatParameters heat;
+};
+struct ParameterSet {
+  AxisSet axes[axis_count];
+};
+
+/// What the driver is set up with: an axis whose set is incomplete gets one that refuses to arm.
+[[nodiscard]] AxisSetup setup_from(const AxisSet& set);
+
+inline constexpr int parameter_count = static_cast<int>(sizeof(AxisSet) / sizeof(float));
+/// Of both dictionaries, ids rising; null beyond. All of them are per axis, and a change needs both axes disarmed.
+[[nodiscard]] const wire::ParameterInfo* parameter_info(int index);
+[[nodiscard]] std::uint8_t parameter_flags(int index);  // wire::ParameterFlag
+[[nodiscard]] float parameter_value(const AxisSet& set, int index);
+
+/// The first thing wrong with a set as a whole. An axis of which nothing was ever given is no mistake: it does not arm.
+[[nodiscard]] wire::Answer check(const ParameterSet& set, const BoardRating& rating);
+
+class ParameterStore {
+ public:
+  static constexpr std::size_t slot_bytes = 1024;
+
+  explicit ParameterStore(const BoardRating& rating) : rating_(rating) {}
+
+  /// Once, before the watchdogs run (it may erase): puts the saved set in force. What the answer refuses must not be
+  /// driven: hand its finding to Driver::hold.
+  template <hal::Store S>
+  wire::Answer start(S& store) {
+    log_.find(store);
+    log_.make_room(store);
+    wire::Answer answer = decode(in_force_);
+    if (answer.status == 0) answer = check(in_force_, rating_);
+    staged_ = in_force_;
+    return answer;
+  }
+
+  const ParameterSet& in_force() const { return in_force_; }
+  const ParameterSet& staged() const { return staged_; }
+
+  /// The value in force.
+  wire::Status get(const wire::Address& of, float& value) const;
+  /// Into the staged set: the range counts, the rest is seen by commit. NaN takes a value back that has no default.
+  wire::Answer stage(const wire::Assignment& one);
+  /// staged := in force, saved or defaults.
+  wire::Answer load(wire::LoadFrom from);
+  /// The staged set is checked as a whole and put in force. Refused: nothing has changed.
+  wire::Answer commit(Driver& driver);
+
+  /// What is in force goes to flash: at most 9.1 ms of standstill (91 words of 100 us).
+  template <hal::Store S>
+  wire::Answer save(const Driver& driver, S& store) {
+    const wire::Answer against = against_saving(driver);
+    if (against.status != 0) return against;
+    Record record;
+    encode(record);
+    switch (log_.append(store, record)) {
+      case RecordLog::Written::done:
+        return {};
+      case RecordLog::Written::no_room:
+        return {static_cast<std::uint8_t>(wire::Status::no_room)};
+      default:
+        return {static_cast<std::uint8_t>(wire::Status::not_written)};
+    }
+  }
+
+  /// Number of the saved record; 0: there is none.
+  std::uint32_t saved_serial() const { return log_.newest().payload.empty() ? 0 : log_.newest().serial; }
+  bool unsaved() const;      // in force and saved differ
+  bool uncommitted() const;  // staged and in force differ
+
+ private:
+  // Payload: version, count, ids (two a word), values of axis 0, of axis 1.
+  static constexpr std::size_t id_words = (parameter_count + 1) / 2;
+  static constexpr std::size_t record_words = header_words + 2 + id_words + axis_count * parameter_count;
+  static_assert(record_words == 91 && 4 * record_words <= slot_bytes);
+  using Record = std::uint32_t[record_words];
+  static constexpr std::uint32_t version = 1;
+
+  void encode(Record& record) const;
+  wire::Answer decode(ParameterSet& set) const;
+  wire::Answer against_saving(const Driver& driver) const;
+
+  BoardRating rating_;
+  RecordLog log_{0x52415048, slot_bytes};  // "HPAR"
+  ParameterSet in_force_, staged_;
+};
+
+}  // namespace firmware
