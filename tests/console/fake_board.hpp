@@ -130,6 +130,12 @@ struct FakeBoard {
     next_row_s_ += decimation_ / 20000.0;
   }
 
+  void refuse(const wire::Frame& frame) {
+    Bytes payload;
+    add(payload, wire::Answer{0xFF, wire::no_axis, 0});  // a status that nobody declared
+    send(static_cast<std::uint8_t>(frame.kind | wire::reply_bit), frame.sequence, payload);
+  }
+
   void answer(const wire::Frame& frame) {
     const auto kind = static_cast<wire::Kind>(frame.kind);
     if (!before(kind) || unplugged) return;
@@ -155,20 +161,25 @@ struct FakeBoard {
         break;
       }
       case wire::Kind::describe_parameter: {
-        const Parameter& p = parameters.at(mask);
+        if (mask >= parameters.size()) return refuse(frame);
+        const Parameter& p = parameters[mask];
         add(payload, wire::ParameterText{{}, p.id, p.axes, p.flags, p.min, p.max, p.fallback});
         add(payload, p.name), add(payload, p.unit), add(payload, p.doc);
         break;
       }
       case wire::Kind::describe_signal: {
-        const Signal& s = signals.at(mask);
+        if (mask >= signals.size()) return refuse(frame);
+        const Signal& s = signals[mask];
         add(payload, wire::SignalText{{}, s.id, 2});
         add(payload, s.name), add(payload, s.unit), add(payload, "doc");
         break;
       }
       case wire::Kind::get:
         add(payload, wire::Answer{});
-        for (const auto& a : list<wire::Address>(frame, 0)) add(payload, in_force.at({a.id, a.axis}));
+        for (const auto& a : list<wire::Address>(frame, 0)) {
+          if (in_force.count({a.id, a.axis}) == 0) return refuse(frame);
+          add(payload, in_force[{a.id, a.axis}]);
+        }
         break;
       case wire::Kind::stage:
         for (const auto& a : list<wire::Assignment>(frame, 0)) staged[{a.address.id, a.address.axis}] = a.value;
@@ -250,7 +261,9 @@ struct FakeBoard {
                                          1000});
         break;
       case wire::Kind::capture_read: {
-        const int first = mask | frame.payload[1] << 8, rows = std::min(20, order_.pre + order_.post - first);
+        const int first = mask | frame.payload[1] << 8,
+                  fit = static_cast<int>(wire::max_row_values) / std::max(1, captured_);
+        const int rows = std::clamp(order_.pre + order_.post - first, 0, fit);
         add(payload, wire::Rows{{},
                                 0,
                                 static_cast<std::uint32_t>(first),
@@ -261,7 +274,7 @@ struct FakeBoard {
         break;
       }
       default:
-        add(payload, wire::Answer{0xFF, wire::no_axis, 0});
+        return refuse(frame);
     }
     twist(kind, payload);
     if (!unplugged) send(wire::reply_to(kind), frame.sequence, payload);
