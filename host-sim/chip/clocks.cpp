@@ -70,6 +70,7 @@ void Rcc::advance(Time now) {
   if (pll_ready_ <= now) {
     pll_ready_ = never;
     at(cr) |= 1u << 25;
+    update();
   }
   if (lsi_ready_ <= now) {
     lsi_ready_ = never;
@@ -158,6 +159,7 @@ void Rcc::on_write(std::uint32_t offset, std::uint32_t value) {
       if (falls >> 24 & 1) at(cr) &= ~(1u << 25);
       if (falls & (1u << 24) && field(peek(cfgr), 0, 2) == 2)
         trouble("PLL switched off while it is the system clock", offset);
+      if (falls >> 24 & 1) update();
       host_.reschedule();
       break;
     }

@@ -106,7 +106,7 @@ class OtgFs : public Device {
   void check_attach();
   std::uint32_t interrupts() const;
   std::uint32_t endpoint_interrupts() const;
-  void update();
+  void update();  // the interrupt line
   bool hears(unsigned device) const;
   void token_after_setup();
 

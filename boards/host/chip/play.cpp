@@ -30,8 +30,7 @@ double counts_to_degC(double counts) {
 
 }  // namespace
 
-ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const std::string& motor_folder,
-                      const std::function<void(double)>& progress) {
+std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, const std::string& motor_folder) {
   using wire::pc::Exit;
   using wire::pc::UserError;
   if (!std::filesystem::exists(elf)) {
@@ -53,8 +52,8 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
   design.ambient_degC = scene.ambient_degC;
   const wire::Motor known = host_sim::true_sheet(file.motor, design.axes[0].heat);
 
-  Pcb pcb(design, scene.seed);
-  pcb.flash_image(elf);
+  auto pcb = std::make_unique<Pcb>(design, scene.seed);
+  pcb->flash_image(elf);
   firmware::AxisSetup setup[2];
   for (firmware::AxisSetup& s : setup) {
     s.parameters = firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f});
@@ -63,13 +62,21 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
                         : scene.trust == "identified" ? thermal::identified_trust
                                                       : thermal::exact_trust;
   }
-  pcb.flash_parameters(setup);
+  pcb->flash_parameters(setup);
   for (int axis = 0; axis < 2; ++axis) {
-    host_sim::Load& load = pcb.bench.load(axis);
+    host_sim::Load& load = pcb->bench.load(axis);
     if (scene.shaft.kind == host::Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
     if (scene.shaft.kind == host::Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
     load.inertia_kg_m2 = scene.shaft.load_inertia_kg_m2;
   }
+  return pcb;
+}
+
+ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const std::string& motor_folder,
+                      const std::function<void(double)>& progress) {
+  const std::unique_ptr<Pcb> board = board_of(scene, elf, motor_folder);
+  Pcb& pcb = *board;
+  const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, motor_folder);
   const auto started = std::chrono::steady_clock::now();
   const std::clock_t processor = std::clock();
   pcb.power_on(scene.seed);
@@ -79,8 +86,8 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
   pcb.run_for(0.5 * warm_up_s - 0.03);
   if (!pcb.arm()) {
     const wire::CodeText text = wire::text_of(static_cast<wire::Status>(pcb.door().answer[0]));
-    throw UserError(Exit::usage, std::string("The image would not arm: ") + text.happened + "; " + text.advice + ".\n" +
-                                     pcb.chip.report_text());
+    throw wire::pc::UserError(wire::pc::Exit::usage, std::string("The image would not arm: ") + text.happened + "; " +
+                                                         text.advice + ".\n" + pcb.chip.report_text());
   }
 
   const bool two_axes =

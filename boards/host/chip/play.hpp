@@ -4,8 +4,10 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
+#include "boards/host/chip/pcb.hpp"
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
 
@@ -21,6 +23,9 @@ struct ChipPlay {
   double asleep_share = 0;
   int resets = 0;
 };
+
+/// The board with the scene's motors, shafts and supply; image and parameters flashed, power still off.
+std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, const std::string& motor_folder);
 
 ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const std::string& motor_folder,
                       const std::function<void(double share)>& progress = {});
