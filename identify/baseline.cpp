@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <limits>
 
+#include "wire/pc/user_error.hpp"
+
 namespace identify {
 namespace {
 
@@ -142,6 +144,12 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
                    const std::optional<wire::pc::MotorFile>& motor, Report& report) {
   const auto start = std::chrono::steady_clock::now();
   const Fit f = fit(problem, {});
+  if (f.x.size() == 0) {
+    throw wire::pc::UserError(wire::pc::Exit::unusable,
+                              problem.logs.front().name +
+                                  ": no motor near this sheet could be so heated and stay so cool; check the current's "
+                                  "unit, whether columns are swapped, and --motor.");
+  }
   report.fit_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   report.iterations = f.iterations;
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";

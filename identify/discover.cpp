@@ -114,7 +114,7 @@ std::string sentence(const Search& found, const Report& r) {
     case Verdict::unknown_cause:
       return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
     case Verdict::insufficient:
-      return "This log is too poor to say what the simulation gets wrong.";
+      return "This log cannot tell what the simulation gets wrong.";
   }
   return "";
 }
@@ -124,7 +124,8 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   double span = 0;
   for (const Bins& log : problem.logs) {
     if (log.missing_share > 0.35)
-      return fmt::format("{}: {:.0f} % of the readings are missing or frozen.", log.name, 100 * log.missing_share);
+      return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
+                         100 * log.missing_share);
     if (log.gap_share > 0.3)
       return fmt::format("{}: gaps make up {:.0f} % of its time.", log.name, 100 * log.gap_share);
     double low = 1e300, high = -1e300;
@@ -140,11 +141,40 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   const double housing_s = std::min(p.R2_K_per_W * p.C2_J_per_K, problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
-  if (all < 0.25 * housing_s) {
-    return fmt::format(
-        "It lasts {:.0f} s, a small part of the housing's time constant of about {:.0f} s; record longer.", all,
-        housing_s);
+  if (all < housing_s) {
+    return fmt::format("It lasts {:.0f} s, less than the housing's time constant of about {:.0f} s; record longer.",
+                       all, housing_s);
   }
+  return "";
+}
+
+/// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
+std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+                      const std::optional<wire::pc::MotorFile>& motor) {
+  const Fit& best = found.chosen.fit;
+  Eigen::Index at = base_count;
+  for (const Chosen& c : best.chosen) {
+    const Cause& cause = causes()[static_cast<std::size_t>(c.cause)];
+    if (cause.edit == Edit::delay && best.at_bound[static_cast<std::size_t>(at)]) {
+      return fmt::format(
+          "Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
+          cause.parameters[0].high);
+    }
+    at += static_cast<Eigen::Index>(cause.parameters.size());
+  }
+  // Where the temperatures follow the square of the speed column better than anything that follows the current.
+  const bool both = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
+    const auto turns = [](double w) { return std::abs(w) > 0; };
+    return log.has(Role::current) && log.has(Role::speed) &&
+           std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(), turns);
+  });
+  if (!both || problem.heated_by_power() || found.base.ratio < 2) return "";
+  std::vector<Log> swapped = logs;
+  for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
+  const Fit other = fit(problem_of(swapped, motor), {});
+  if (other.misfit < best.misfit && other.misfit < 0.25 * found.base.fit.misfit)
+    return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
+           "swapped; map them with --column.";
   return "";
 }
 
@@ -185,17 +215,19 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
           : fmt::format("Noise of a housing reading: {:.3f} K white from its differences; too little rest to see the "
                         "slow part, {:.3f} K assumed.",
                         problem.noise.housing_white_K, problem.noise.housing_slow_K));
-  const std::string poor = too_poor(problem, base);
+  std::string poor = too_poor(problem, base);
   Search found;
+  if (poor.empty()) {
+    found = search(problem);
+    poor = suspicion(problem, found, logs, motor);
+  }
+  const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
+  if (!extended) found.chosen.fit = base;
   if (!poor.empty()) {
-    found.chosen.fit = base;
     report.verdict = word(Verdict::insufficient);
-    report.sentence = "This log is too poor to say what the simulation gets wrong. " + poor;
+    report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
     report.reasoning.push_back(poor);
   } else {
-    found = search(problem);
-    const bool extended = !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
-    if (!extended) found.chosen.fit = base;
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
     if (extended) {

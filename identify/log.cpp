@@ -125,6 +125,16 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     }
     check_range(log, role, -80, 600, "degC");
   }
+  // Without anything that says how warm it is around the motor, a motor that is never cooler than a room can be is no
+  // use, whatever its unit.
+  const Role motor_at = log.has(Role::housing) ? Role::housing : Role::core;
+  if (!log.has(Role::ambient) && !log.has(Role::coolant) && lowest(log.of(motor_at)) > 55) {
+    throw UserError(
+        Exit::unusable,
+        fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
+                    "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
+                    log.name, own_name(motor_at), lowest(log.of(motor_at))));
+  }
   // 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A
   // is beyond any board this project drives or any traction log it was shown.
   const double most_A = motor ? 40 * motor->rated_current_A : 1000;
@@ -138,6 +148,45 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     }
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
+}
+
+/// More current makes a winding hotter than its housing within seconds. Where it makes it cooler, and the housing moves
+/// more than the winding, the two columns are swapped. One sign alone may be a sensor's gain or noise; not both.
+void check_order(const Log& log) {
+  if (!log.has(Role::housing) || !log.has(Role::core) || !log.has(Role::current)) return;
+  constexpr double apart_s = 20;  // far enough for a winding to have moved, and noise not to count
+  const auto &t = log.of(Role::time), &housing = log.of(Role::housing), &core = log.of(Role::core),
+             &current = log.of(Role::current);
+  double housing2 = 0, core2 = 0, over2 = 0, heat2 = 0, together = 0;
+  int pairs = 0;
+  double sum_A2 = 0, rows = 0, mean_A2 = 0, last_mean_A2 = 0;
+  std::size_t last = t.size();
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    if (!std::isnan(current[i])) sum_A2 += current[i] * current[i], ++rows;
+    if (std::isnan(housing[i]) || std::isnan(core[i])) continue;
+    if (last < t.size() && t[i] - t[last] < apart_s) continue;
+    last_mean_A2 = mean_A2;
+    mean_A2 = sum_A2 / std::max(rows, 1.0);
+    sum_A2 = rows = 0;
+    if (last < t.size()) {
+      const double housing_K = housing[i] - housing[last], core_K = core[i] - core[last];
+      const double over_K = core_K - housing_K, heat_A2 = mean_A2 - last_mean_A2;
+      housing2 += housing_K * housing_K;
+      core2 += core_K * core_K;
+      over2 += over_K * over_K;
+      heat2 += heat_A2 * heat_A2;
+      together += over_K * heat_A2;
+      ++pairs;
+    }
+    last = i;
+  }
+  // A correlation of -0.35 in ten pairs is chance in one of six, and the other condition another.
+  if (pairs < 10 || !(housing2 > core2) || !(together < -0.35 * std::sqrt(over2 * heat2))) return;
+  throw UserError(
+      Exit::unusable,
+      fmt::format("{}: core_degC falls against housing_degC when the current rises, and moves less: the two "
+                  "columns are swapped; map them with --column.",
+                  log.name));
 }
 
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
@@ -236,6 +285,7 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
                       sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
     check_values(log, motor);
     mask(log);
+    check_order(log);
     logs.push_back(std::move(log));
   }
   return logs;

@@ -149,6 +149,13 @@ void mask(Log& log) {
     log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
                                     gaps, gaps == 1 ? "" : "s", lost_s, duration, gaps == 1 ? "it" : "them"));
   }
+  // Rows that are missing one by one among the others: the current that flowed in them is not known either.
+  const double rows_lost = duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s) / duration : 0;
+  if (rows_lost > 0.1) {
+    log.notes.push_back(
+        fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).", 100 * rows_lost, usual));
+  }
+  log.missing_share = std::max(log.missing_share, rows_lost);
   const bool any = log.has(Role::housing) || log.has(Role::core);
   if (!any)
     throw UserError(Exit::unusable,

@@ -136,6 +136,29 @@ TEST(Reader, KelvinIsRecognised) { says(complaint(head + "0,1,293\n1,1,294\n"), 
 TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
   says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,70,70\n1,1,71,70\n"), "looks like Fahrenheit");
 }
+TEST(Reader, AMotorWarmerThanAnyRoomWithoutAnAmbientIsRefusedWithTheUnitItMayBe) {
+  says(complaint(head + "0,1,70\n1,1,71\n"), "if this is Fahrenheit say --column housing_degC=COLUMN:degF");
+}
+TEST(Reader, HousingAndWindingSwappedAreRecognised) {
+  // A winding (2 s) on a housing (300 s), half a minute of load and rest by turns.
+  std::string right = "time_s,current_A,housing_degC,core_degC\n",
+              swapped = "time_s,current_A,core_degC,housing_degC\n";
+  double core = 25, housing = 25;
+  for (int i = 0; i < 600; ++i) {
+    const double current = (i / 37) % 2 == 0 ? 3 : 0;
+    for (std::string* text : {&right, &swapped}) {
+      *text += std::to_string(i) + "," + std::to_string(current) + "," + std::to_string(housing) + "," +
+               std::to_string(core) + "\n";
+    }
+    for (int k = 0; k < 10; ++k) {
+      const double flow = core - housing;
+      core += 0.1 * (current * current - flow) / 2;
+      housing += 0.1 * (flow - (housing - 25) / 15) / 20;
+    }
+  }
+  EXPECT_NO_THROW(read(right));
+  says(complaint(swapped), "the two columns are swapped");
+}
 TEST(Reader, MilliampereIsRecognised) { says(complaint(head + "0,1500,20\n1,-2500,20\n"), "if it is in mA"); }
 TEST(Reader, ImpossibleTemperaturesAreRefused) {
   says(complaint(head + "0,1,20\n1,1,9999\n"), "housing_degC reaches 9999");
@@ -192,6 +215,14 @@ TEST(Masks, ACoarseOrConstantChannelIsNotFrozen) {
   std::vector<double> coarse;
   for (int i = 0; i < 2000; ++i) coarse.push_back(20 + 0.5 * std::floor(10 * (1 - std::exp(-i / 300.0)) / 0.5));
   EXPECT_TRUE(identify::frozen_runs(coarse).empty());
+}
+TEST(Masks, RowsMissingOneByOneAreCounted) {
+  std::string text = head;
+  for (int i = 0; i < 400; ++i) {
+    if (i * 7919 % 10 >= 4) text += std::to_string(0.1 * i) + ",1," + std::to_string(20 + i % 7) + "\n";
+  }
+  const Log log = read(text)[0];
+  EXPECT_NEAR(log.missing_share, 0.4, 0.05);
 }
 TEST(Masks, GapsInTimeAreCounted) {
   std::string text = head;

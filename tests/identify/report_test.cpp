@@ -5,7 +5,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 
 #include "identify/discover.hpp"
@@ -86,6 +89,77 @@ TEST(Report, WhatIsAdequateHasNothingToGain) {
   const identify::Report report = report_of(options);
   EXPECT_EQ(report.verdict, "adequate");
   EXPECT_FALSE(report.gain);
+}
+
+/// A good log whose rows `edit` spoils: (time, current, speed, housing, ambient, winding or empty).
+std::string spoilt(const std::function<bool(std::vector<std::string>&, int)>& edit) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seconds = 900;
+  const std::string path = tests::write_bench_log("hotcore_spoilt.csv", options);
+  std::ifstream in(path);
+  std::string line, out;
+  std::getline(in, line);
+  out = line + "\n";
+  for (int row = 0; std::getline(in, line); ++row) {
+    std::vector<std::string> cells;
+    std::istringstream text(line + ",");
+    for (std::string cell; std::getline(text, cell, ',');) cells.push_back(cell);
+    if (!edit(cells, row)) continue;
+    for (std::size_t i = 0; i < cells.size(); ++i) out += (i > 0 ? "," : "") + cells[i];
+    out += "\n";
+  }
+  in.close();
+  std::ofstream(path) << out;
+  return path;
+}
+
+/// What the program says of it: exit 3 with one sentence, or the verdict insufficient; never a name.
+void refused(const std::string& path, const std::string& because) {
+  const Outcome r = run(path + " --motor ec-16-40w");
+  EXPECT_TRUE(r.code == 3 || r.out.find("Verdict: insufficient") != std::string::npos) << r.out;
+  EXPECT_EQ(r.out.find("behaves"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find(because), std::string::npos) << r.out;
+}
+
+TEST(BadInput, AGoodLogIsAnsweredUntilItIsSpoilt) {
+  const Outcome r = run(spoilt([](auto&, int) { return true; }) + " --motor ec-16-40w");
+  EXPECT_EQ(r.code, 0);
+  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
+}
+
+TEST(BadInput, NothingThatVaries) {
+  refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "The temperatures move by 0.0 K");
+}
+
+TEST(BadInput, ShorterThanTheHousingsTimeConstant) {
+  refused(spoilt([](auto&, int row) { return row < 1200; }), "less than the housing's time constant");
+}
+
+TEST(BadInput, FortyPercentMissing) {
+  std::mt19937 random(4);
+  refused(spoilt([&](auto&, int) { return random() % 10 >= 4; }), "40 % of the readings or rows are missing");
+  refused(spoilt([&](auto& row, int) { return row[3] = random() % 10 < 4 ? "" : row[3], true; }),
+          "40 % of the readings or rows are missing");
+}
+
+TEST(BadInput, TwoClocksTwoMinutesApart) {
+  std::vector<std::string> earlier;
+  refused(spoilt([&](auto& row, int number) {
+            earlier.push_back(row[1]);
+            row[1] = earlier[static_cast<std::size_t>(std::max(0, number - 1200))];
+            return true;
+          }),
+          "two clocks");
+}
+
+TEST(BadInput, CurrentAndSpeedSwapped) {
+  refused(spoilt([](auto& row, int number) {
+            row[2] = row[1];
+            row[1] = number / 300 % 2 == 0 ? "0" : "2.5";
+            return true;
+          }),
+          "swapped");
 }
 
 TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
