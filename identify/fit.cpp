@@ -210,8 +210,7 @@ bool evaluate_any(const Problem& problem, const std::vector<Chosen>& chosen, con
   const int n = base_count + coordinates_of(chosen) + per_log_count;
   if (n <= 6) return evaluate<6>(problem, chosen, x, out);
   if (n <= 8) return evaluate<8>(problem, chosen, x, out);
-  if (n <= 10) return evaluate<10>(problem, chosen, x, out);
-  return evaluate<14>(problem, chosen, x, out);
+  return evaluate<10>(problem, chosen, x, out);  // two causes have four parameters at most
 }
 
 double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
@@ -260,14 +259,13 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
     return A.ldlt().solve(b);
   };
   linearise();
-  for (int it = 0; it < most; ++it) {
-    out.iterations = it + 1;
+  for (;;) {
     // Newton decrement: what a full step still promises. Below 0.005 in log-likelihood no decision changes.
     const Eigen::VectorXd newton = step_with(0);
-    if (-g.dot(newton) < 0.01) {
-      out.settled = true;
-      break;
-    }
+    out.promise = -0.5 * g.dot(newton);
+    out.settled = out.promise < 0.005;
+    if (out.settled || out.iterations == most) break;
+    ++out.iterations;
     bool better = false;
     for (int attempt = 0; attempt < 9; ++attempt) {
       const Eigen::VectorXd dx = damping < 1e-5 ? newton : step_with(damping);
@@ -325,45 +323,61 @@ Eigen::VectorXd Fit::std_errors() const {
   return covariance.diagonal().cwiseMax(0).cwiseSqrt();
 }
 
-Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* warm) {
+Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm, int most) {
   const auto c = layout(problem, chosen);
   const auto n = static_cast<Eigen::Index>(c.size());
   Eigen::VectorXd x(n);
   for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
-  const int own = coordinates_of(chosen);
-  int shared = 0;
-  if (warm != nullptr) {  // one list of causes is a beginning of the other
-    shared = std::min(warm->cause_coordinates(), own);
-    x.head(base_count + shared) = warm->x.head(base_count + shared);
-    x.tail(n - base_count - own) = warm->x.tail(warm->x.size() - base_count - warm->cause_coordinates());
+  if (warm.size() > 0) {
+    const Fit& from = **warm.begin();
+    const auto initial = per_log_count * static_cast<Eigen::Index>(problem.logs.size());
+    x.head(base_count) = from.x.head(base_count);
+    x.tail(initial) = from.x.tail(initial);
   }
-  if (shared == own) return descend(problem, chosen, c, x, 60);
+  bool last_is_known = true;
+  Eigen::Index at = base_count, last = base_count;
+  for (const Chosen& cause : chosen) {
+    last = at;
+    const Eigen::Index parameters = coordinates_of({cause});
+    last_is_known = false;
+    for (const Fit* from : warm) {
+      Eigen::Index there = base_count;
+      for (const Chosen& other : from->chosen) {
+        if (!last_is_known && other == cause) {
+          x.segment(at, parameters) = from->x.segment(there, parameters);
+          last_is_known = true;
+        }
+        there += coordinates_of({other});
+      }
+    }
+    at += parameters;
+  }
+  if (last_is_known) return descend(problem, chosen, c, x, most);
 
   // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one
-  // valley.
-  const Cause& last = causes()[static_cast<std::size_t>(chosen.back().cause)];
-  const int first = base_count + own - static_cast<int>(last.parameters.size());
+  // valley. A few steps tell which is worth descending into.
+  constexpr int look = 4;
+  const Cause& unknown = causes()[static_cast<std::size_t>(chosen.back().cause)];
+  const double start0 = x[last], sd0 = c[static_cast<std::size_t>(last)].sd;
   std::vector<std::vector<double>> starts;
-  if (last.edit == Edit::cooling_step) {
+  if (unknown.edit == Edit::cooling_step) {
     for (const double when : {0.15, 0.33, 0.5, 0.67, 0.85}) starts.push_back({0.1, when});
-  } else if (last.parameters.front().logarithmic && last.parameters.size() == 2) {
-    for (const double shift : {0.0, -2.0})
-      starts.push_back(
-          {c[static_cast<std::size_t>(first)].start + shift, c[static_cast<std::size_t>(first) + 1].start - shift / 2});
-  } else if (last.edit == Edit::sensor_lag) {
+  } else if (unknown.parameters.front().logarithmic && unknown.parameters.size() == 2) {
+    for (const double shift : {0.0, -2.0}) starts.push_back({start0 + shift, x[last + 1] - shift / 2});
+  } else if (unknown.edit == Edit::sensor_lag) {
     starts = {{3}, {30}, {75}};
-  } else if (last.edit == Edit::delay) {
+  } else if (unknown.edit == Edit::delay) {
     starts = {{2}, {20}, {-10}};
   } else {
-    starts = {{c[static_cast<std::size_t>(first)].start + 0.1 * c[static_cast<std::size_t>(first)].sd}};
+    starts = {{start0 + 0.1 * sd0}};
   }
   Fit best;
   for (const auto& start : starts) {
-    for (std::size_t p = 0; p < start.size(); ++p) x[first + static_cast<Eigen::Index>(p)] = start[p];
-    Fit f = descend(problem, chosen, c, x, 40);
-    if (f.cost < best.cost) best = std::move(f);
+    for (std::size_t p = 0; p < start.size(); ++p) x[last + static_cast<Eigen::Index>(p)] = start[p];
+    Fit f = descend(problem, chosen, c, x, starts.size() > 1 ? std::min(look, most) : most);
+    if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
   }
-  return best.settled || best.x.size() == 0 ? best : descend(problem, chosen, c, best.x, 40);
+  return best.settled || best.x.size() == 0 || starts.size() == 1 ? best : descend(problem, chosen, c, best.x, most);
 }
 
 Fit transferred(const Problem& other, const Fit& from) {

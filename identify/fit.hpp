@@ -25,7 +25,8 @@ struct Fit {
   double misfit = 1e300;        // the same without prior
   int readings = 0;             // whitened residuals that entered
   int iterations = 0;
-  bool settled = false;  // no coordinate would move by more than 1/20 of its standard error
+  bool settled = false;  // a full step would lower the cost by less than 0.005: no decision changes
+  double promise = 0;    // what a full step would still take from the cost, were the model linear
   std::vector<bool> at_bound;
 
   int cause_coordinates() const;
@@ -33,9 +34,12 @@ struct Fit {
   double bic() const;
 };
 
-/// Fits with the causes `chosen`. `warm`: a fit whose base and initial coordinates (and those of the causes it shares,
-/// when its list is a beginning of this one) are the first start.
-Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, const Fit* warm = nullptr);
+/// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause
+/// starts from its parameters in the first of them that has it. A last cause that none has starts near nothing, and,
+/// where it is nonlinear in its parameters, from several places. `most`: Newton steps; few are a look at what the
+/// causes promise.
+Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
+        int most = 60);
 
 /// The same model on other logs of the motor: base and causes held as in `from`, initial temperatures from the
 /// first readings.

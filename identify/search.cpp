@@ -11,11 +11,15 @@
 namespace identify {
 namespace {
 
-// Three causes at once imitate nearly anything (of seven forms that the table does not know, five were "explained" by
-// some three of it); two do not.
-constexpr std::size_t most_causes = 2;
-constexpr std::size_t beam =
-    4;  // sets kept when one more cause is tried: the best first cause is not always in the best pair
+// Two causes at most: three at once imitate nearly anything (of seven forms that the table does not know, five were
+// "explained" by some three of it); two do not.
+//
+// Every pair is looked at with a few Newton steps, and those that may come near the best are fitted to the end. A look
+// errs by less than this in evidence, as far as the best pair is concerned.
+constexpr int look_steps = 2;
+constexpr double look_errs = 40;
+constexpr std::size_t most_finished = 24;
+constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
 double ratio_of(const Fit& f) { return std::sqrt(2 * f.misfit / std::max(1, f.readings)); }
 
@@ -31,11 +35,6 @@ Candidate candidate(const Candidate& base, Fit f) {
 
 void sort(std::vector<Candidate>& list) {
   std::sort(list.begin(), list.end(), [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
-}
-
-bool same_set(const std::vector<Chosen>& a, const std::vector<Chosen>& b) {
-  return a.size() == b.size() &&
-         std::all_of(a.begin(), a.end(), [&](const Chosen& c) { return std::find(b.begin(), b.end(), c) != b.end(); });
 }
 
 /// Two causes that claim the same slot of the model cannot both be applied.
@@ -105,7 +104,7 @@ double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
 /// The error on the last quarter of each log of a set fitted to the rest: of the winding where it is read.
 double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen, const Fit& warm) {
   const Problem first = first_part(problem, 0.25);
-  const Fit f = fit(first, chosen, &warm);
+  const Fit f = fit(first, chosen, {&warm});
   if (f.x.size() == 0) return 1e300;
   const Rmse e = rmse_of(last_part(problem, 0.25), f);
   return std::isnan(e.core_K) ? e.housing_K : e.core_K;
@@ -127,6 +126,78 @@ void refine_core_noise(Problem& problem, const Fit& best) {
     }
   }
   if (n >= 10) problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), 0.5, 3.0);
+}
+
+/// Every cause alone, best first.
+std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
+                                  const std::vector<Candidate>& before) {
+  std::vector<Candidate> out;
+  for (const Chosen& c : all) {
+    const auto known = std::find_if(before.begin(), before.end(),
+                                    [&](const Candidate& b) { return b.fit.chosen == std::vector<Chosen>{c}; });
+    Fit f = known == before.end() ? fit(problem, {c}, {&base.fit}) : fit(problem, {c}, {&known->fit});
+    if (f.x.size() > 0) out.push_back(candidate(base, std::move(f)));
+  }
+  sort(out);
+  return out;
+}
+
+/// The pairs that may come near the best one, fitted to the end, best first.
+std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, const std::vector<Candidate>& singles) {
+  const auto hoped = [](const Fit& f) { return f.bic() - 2 * f.promise; };
+  std::vector<Fit> looks;
+  for (std::size_t a = 0; a < singles.size(); ++a) {
+    const Fit& better = singles[a].fit;
+    for (std::size_t b = a + 1; b < singles.size(); ++b) {
+      if (!compatible(better.chosen, singles[b].fit.chosen.front())) continue;
+      const std::vector<Chosen> set = {better.chosen.front(), singles[b].fit.chosen.front()};
+      Fit f = fit(problem, set, {&better, &singles[b].fit}, look_steps);
+      if (a < beam) {
+        Fit anew = fit(problem, set, {&better}, look_steps);
+        if (anew.x.size() > 0 && (f.x.size() == 0 || hoped(anew) < hoped(f))) f = std::move(anew);
+      }
+      if (f.x.size() > 0) looks.push_back(std::move(f));
+    }
+  }
+  std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
+  std::vector<Candidate> out;
+  double best = 1e300;
+  for (std::size_t i = 0; i < std::min(most_finished, looks.size()); ++i) {
+    if (hoped(looks[i]) > best + look_errs) break;
+    Fit f = fit(problem, looks[i].chosen, {&looks[i]});
+    best = std::min(best, f.bic());
+    out.push_back(candidate(base, std::move(f)));
+  }
+  sort(out);
+  return out;
+}
+
+/// Why the best pair is not believed; empty when it is.
+std::string why_no_pair(const Problem& problem, const std::vector<Candidate>& pairs, const Candidate& single,
+                        const Margins& margins) {
+  const std::string first = listed(single.fit.chosen);
+  if (pairs.empty()) return fmt::format("No further cause goes with {}.", first);
+  const Candidate& pair = pairs.front();
+  const std::string both = listed(pair.fit.chosen);
+  const double more = pair.gain - single.gain;
+  if (!(more > margins.second * bluntness(problem, pair, margins.adequate_ratio)))
+    return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
+                       margins.second, first);
+  const double moved = moved_K(problem, pair.fit, single.fit);
+  if (moved < margins.noticeable_K)
+    return fmt::format(
+        "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.", both, more,
+        moved);
+  // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
+  if (pair.ratio > margins.adequate_ratio || single.ratio > margins.adequate_ratio) {
+    const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
+    const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
+    if (more_K > 1.1 * fewer_K)
+      return fmt::format(
+          "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
+          more_K, first, fewer_K);
+  }
+  return "";
 }
 
 }  // namespace
@@ -162,12 +233,11 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const auto all = available(problem, without);
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
   for (int pass = 0; pass < (sparse_core ? 2 : 1); ++pass) {
-    out.singles.clear();
-    out.base = {};
-    out.base.fit = fit(problem, {});
-    out.base.ratio = ratio_of(out.base.fit);
-    for (const Chosen& c : all) out.singles.push_back(candidate(out.base, fit(problem, {c}, &out.base.fit)));
-    sort(out.singles);
+    Candidate base;
+    base.fit = pass == 0 ? fit(problem, {}) : fit(problem, {}, {&out.base.fit});
+    base.ratio = ratio_of(base.fit);
+    out.base = std::move(base);
+    out.singles = singles_of(problem, all, out.base, out.singles);
     if (pass == 0 && sparse_core && !out.singles.empty()) {
       refine_core_noise(problem, out.singles.front().gain > 0 ? out.singles.front().fit : out.base.fit);
     }
@@ -190,63 +260,27 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     return out;
   }
 
-  std::vector<Candidate> level = out.singles;
-  std::vector<Candidate> best_level = level;
-  while (level.front().fit.chosen.size() < most_causes) {
-    std::vector<Candidate> next;
-    for (std::size_t b = 0; b < std::min(beam, level.size()); ++b) {
-      for (const Chosen& more : all) {
-        if (!compatible(level[b].fit.chosen, more)) continue;
-        auto set = level[b].fit.chosen;
-        set.push_back(more);
-        if (std::any_of(next.begin(), next.end(), [&](const Candidate& c) { return same_set(c.fit.chosen, set); }))
-          continue;
-        next.push_back(candidate(out.base, fit(problem, set, &level[b].fit)));
-      }
+  out.sets = out.singles;
+  std::vector<Candidate> pairs = pairs_of(problem, out.base, out.singles);
+  // A second cause may only have helped the first out of a poor valley: each alone starts again from where the pair
+  // ended, and the pair must beat that.
+  for (std::size_t i = 0; i < std::min(beam, pairs.size()); ++i) {
+    for (Candidate& alone : out.sets) {
+      const auto& both = pairs[i].fit.chosen;
+      if (std::find(both.begin(), both.end(), alone.fit.chosen.front()) == both.end()) continue;
+      Fit again = fit(problem, alone.fit.chosen, {&pairs[i].fit});
+      if (again.x.size() > 0 && again.cost < alone.fit.cost) alone = candidate(out.base, std::move(again));
     }
-    sort(next);
-    // Re-test: a second cause may only have helped the first out of a poor valley. The smaller set starts again from
-    // where the larger one ended, and the larger one must beat that.
-    for (std::size_t b = 0; b < std::min(beam, level.size()); ++b) {
-      const auto child = std::find_if(next.begin(), next.end(), [&](const Candidate& c) {
-        return std::equal(level[b].fit.chosen.begin(), level[b].fit.chosen.end(), c.fit.chosen.begin());
-      });
-      if (child == next.end() || child->gain - level[b].gain < margins.second) continue;
-      Candidate again = candidate(out.base, fit(problem, level[b].fit.chosen, &child->fit));
-      if (again.gain > level[b].gain) best_level[b] = level[b] = std::move(again);
-    }
-    sort(best_level);
-    if (next.empty() || !(next.front().gain - best_level.front().gain >
-                          margins.second * bluntness(problem, next.front(), margins.adequate_ratio))) {
-      out.steps.push_back(fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.",
-                                      next.empty() ? 0.0 : next.front().gain - best_level.front().gain, margins.second,
-                                      listed(best_level.front().fit.chosen)));
-      break;
-    }
-    const double moved = moved_K(problem, next.front().fit, best_level.front().fit);
-    if (moved < margins.noticeable_K) {
-      out.steps.push_back(fmt::format(
-          "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.",
-          listed(next.front().fit.chosen), next.front().gain - best_level.front().gain, moved));
-      break;
-    }
-    // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
-    if (next.front().ratio > margins.adequate_ratio || best_level.front().ratio > margins.adequate_ratio) {
-      const double fewer = unseen_error_K(problem, best_level.front().fit.chosen, best_level.front().fit);
-      const double more = unseen_error_K(problem, next.front().fit.chosen, next.front().fit);
-      if (more > 1.1 * fewer) {
-        out.steps.push_back(fmt::format(
-            "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.",
-            listed(next.front().fit.chosen), more, listed(best_level.front().fit.chosen), fewer));
-        break;
-      }
-    }
-    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(next.front().fit.chosen),
-                                    next.front().gain, next.front().gain - best_level.front().gain,
-                                    listed(best_level.front().fit.chosen)));
-    level = best_level = std::move(next);
   }
-  out.sets = std::move(best_level);
+  sort(out.sets);
+  if (const std::string refusal = why_no_pair(problem, pairs, out.sets.front(), margins); refusal.empty()) {
+    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pairs.front().fit.chosen),
+                                    pairs.front().gain, pairs.front().gain - out.sets.front().gain,
+                                    listed(out.sets.front().fit.chosen)));
+    out.sets = std::move(pairs);
+  } else {
+    out.steps.push_back(refusal);
+  }
   out.sets.front().chosen = true;
   out.chosen = out.sets.front();
   const std::vector<std::string> best_ids = ids_of(out.chosen.fit.chosen);
