@@ -108,6 +108,8 @@ inline constexpr std::uint32_t conversion_cycles = 12;          // 12 bits, 13.5
 inline constexpr std::uint32_t sample_lead = sample_cycles * timer_Hz / adc_Hz;
 inline constexpr float amplifier_settling_s = 1.0e-6f;  // to 1 %, INA240 class
 
+inline constexpr std::uint32_t usb_connect_ms = 30;  // device mode is forced for 25 ms by then, 34.16.2
+
 inline constexpr std::uint32_t cycles_per_period = hclk_Hz / pwm_Hz;
 
 // ---- watchdogs ------------------------------------------------------------------------------------------------------
@@ -131,6 +133,7 @@ inline constexpr Priority pvd_irq{1, 0};            // supply goes: gates off, n
 inline constexpr Priority index0_irq{9, 1};         // EXTI3: reads a counter, 1.5 us per count at 1000 rad/s
 inline constexpr Priority index1_irq{23, 1};        // EXTI9_5
 inline constexpr Priority adc_irq{18, 2};           // the fast lane of both axes
+inline constexpr Priority usb_irq{67, 8};           // above the slow lane: a setpoint that came is in force next period
 inline constexpr std::uint32_t systick_level = 14;  // the clock of the main loop, where the slow lane runs
 
 // ---- what must fit together
@@ -151,6 +154,7 @@ static_assert(2e6f * static_cast<float>(sample_cycles + conversion_cycles) / sta
               "two conversions must end before the other axis begins");
 static_assert((iwdg_reload + 1) * 4'000u / lsi_slowest_Hz < 35 && (iwdg_reload + 1) * 4'000u / lsi_fastest_Hz >= 12);
 static_assert(wwdg_steps * 4096u < pclk1_Hz / 500, "a hang of the fast lane: gates off within 2 ms");
-static_assert(pvd_irq.level < index0_irq.level && index0_irq.level < adc_irq.level && adc_irq.level < systick_level);
+static_assert(pvd_irq.level < index0_irq.level && index0_irq.level < adc_irq.level &&
+              adc_irq.level < usb_irq.level && usb_irq.level < systick_level);
 
 }  // namespace h8_15d

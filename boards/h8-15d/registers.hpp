@@ -110,9 +110,27 @@ inline constexpr std::uint32_t cr = 0x40002C00;   // 22.6.1
 inline constexpr std::uint32_t cfr = 0x40002C04;  // 22.6.2
 }  // namespace wwdg
 
-namespace otg_fs {                                  // 34.16
-inline constexpr std::uint32_t gccfg = 0x50000038;  // 34.16.2
-inline constexpr std::uint32_t dctl = 0x50000804;   // 34.16.4
+namespace otg_fs {                                    // 34.16
+inline constexpr std::uint32_t gahbcfg = 0x50000008;  // 34.16.2, core global registers
+inline constexpr std::uint32_t gusbcfg = 0x5000000C;
+inline constexpr std::uint32_t grstctl = 0x50000010;
+inline constexpr std::uint32_t gintsts = 0x50000014;
+inline constexpr std::uint32_t gintmsk = 0x50000018;
+inline constexpr std::uint32_t grxstsp = 0x50000020;
+inline constexpr std::uint32_t grxfsiz = 0x50000024;
+inline constexpr std::uint32_t dieptxf0 = 0x50000028;
+inline constexpr std::uint32_t gccfg = 0x50000038;
+inline constexpr std::uint32_t dieptxf1 = 0x50000104;  // 2 and 3 follow
+inline constexpr std::uint32_t dcfg = 0x50000800;      // 34.16.4, device mode registers
+inline constexpr std::uint32_t dctl = 0x50000804;
+inline constexpr std::uint32_t diepmsk = 0x50000810;
+inline constexpr std::uint32_t doepmsk = 0x50000814;
+inline constexpr std::uint32_t daint = 0x50000818;
+inline constexpr std::uint32_t daintmsk = 0x5000081C;
+constexpr std::uint32_t in(int n) { return 0x50000900 + 0x20 * static_cast<std::uint32_t>(n); }
+constexpr std::uint32_t out(int n) { return 0x50000B00 + 0x20 * static_cast<std::uint32_t>(n); }
+inline constexpr std::uint32_t ctl = 0x00, intr = 0x08, siz = 0x10;                                  // of one endpoint
+constexpr std::uint32_t fifo(int n) { return 0x50001000 + 0x1000 * static_cast<std::uint32_t>(n); }  // 34.16.1
 }  // namespace otg_fs
 
 inline constexpr std::uint32_t backup_ram = 0x40024000, backup_ram_bytes = 4096;  // 2.3, 5.1.2
