@@ -120,6 +120,7 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample));
   HeatSums& sums = heat_.adding();
   add_heat(sums, phase_A, sight.periods);
+  trace_.note_sample(phase_A, sample.rotor_rad);
 
   setpoint_.follow(sight.periods);
   if (mode_ != Mode::running || !(setpoint_.share() > 0.0f)) return resting(sample, current_A, sight.periods);
@@ -241,8 +242,26 @@ void Axis::obey() {
 FastView Axis::fast() const {
   const float share = trace_.share;
   const bool saturated = trace_.limit == wire::Limit::none && share < 1.0f;
-  return {trace_.current_A, trace_.permitted_A, {trace_.asked_V.d * share, trace_.asked_V.q * share}, last_.ratio,
-          trace_.bus_V,     rotor_.rad_per_s(), saturated ? wire::Limit::voltage : trace_.limit};
+  return {trace_.current_A,
+          trace_.permitted_A,
+          {trace_.asked_V.d * share, trace_.asked_V.q * share},
+          last_.ratio,
+          trace_.bus_V,
+          rotor_.rad_per_s(),
+          trace_.rotor_rad,
+          saturated ? wire::Limit::voltage : trace_.limit};
+}
+
+SignalPlace Axis::signal(std::uint8_t id) const {
+  switch (id) {
+#define SIGNAL(number, name, unit, where, doc) \
+  case number:                                 \
+    return SignalPlace(where);
+#include "firmware/axis.signals"
+#undef SIGNAL
+    default:
+      return {};
+  }
 }
 
 FaultRecord Axis::fault() const {

@@ -27,6 +27,7 @@
 #include "firmware/permit.hpp"
 #include "firmware/rotor.hpp"
 #include "firmware/setpoint.hpp"
+#include "firmware/signals.hpp"
 #include "hal/axis_port.hpp"
 #include "hal/board_port.hpp"
 #include "thermal/core_estimator.hpp"
@@ -57,6 +58,7 @@ struct FastView {
   Abc ratio;
   float bus_V;
   float rad_per_s;  // mechanical
+  float rotor_rad;  // mechanical, [0, 2 pi]
   wire::Limit limit;
 };
 
@@ -108,8 +110,13 @@ class Axis {
 
   /// off -> ready. Only setpoints that come later count. The answer says what speaks against it; done = posted.
   wire::Status arm();
-  /// Any mode but tripped -> off: bridge open at the next tick.
-  void disarm() { post(Command::disarm); }
+  /// What speaks against arming now.
+  wire::Status against_arming() const;
+  /// Any mode but tripped -> off: bridge open at the next tick. Takes back an `arm` that was not obeyed yet.
+  void disarm() {
+    commands_.fetch_and(static_cast<std::uint8_t>(~static_cast<unsigned>(Command::arm)));
+    post(Command::disarm);
+  }
   /// tripped -> off, if the last setpoint is zero.
   wire::Status clear();
 
@@ -117,6 +124,9 @@ class Axis {
   Mode mode() const { return mode_; }
   FastView fast() const;
   FaultRecord fault() const;
+  /// Where a signal of axis.signals lies; empty if there is no such id.
+  SignalPlace signal(std::uint8_t id) const;
+  bool offset_known() const { return offsets_.known(); }
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
 
   /// As of the last slow tick.
@@ -131,7 +141,6 @@ class Axis {
   enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
-  wire::Status against_arming() const;
   void judge(const AxisSetup& setup);
   void take_over();
   [[gnu::noinline]] void obey();
@@ -170,9 +179,14 @@ class Axis {
   /// Written by each tick; the law does not read it back, but for the current that missed samples are charged with.
   struct Trace {
     Dq current_A{}, permitted_A{}, asked_V{};
-    float share = 1.0f, bus_V = 0.0f;
+    Abc phase_A{};
+    float share = 1.0f, bus_V = 0.0f, rotor_rad = 0.0f;
     wire::Limit limit = wire::Limit::none;
 
+    void note_sample(const Abc& phase, float rotor) {
+      phase_A.a = phase.a, phase_A.b = phase.b, phase_A.c = phase.c;
+      rotor_rad = rotor;
+    }
     void note(Dq current, Dq permitted, Dq asked, float given, float bus, wire::Limit why) {
       // By component: the compiler copies a whole Dq by way of the stack.
       current_A.d = current.d, current_A.q = current.q;

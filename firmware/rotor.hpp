@@ -56,7 +56,7 @@ class Rotor {
     return {{electrical}, {electrical + whole(rad_per_s_ * ahead_per_speed_)}};
   }
 
-  float rad_per_s() const { return rad_per_s_; }  // mechanical
+  const float& rad_per_s() const { return rad_per_s_; }  // mechanical
   float electrical_rad_per_s() const { return rad_per_s_ * electrical_per_mechanical_; }
 
  private:

@@ -106,6 +106,8 @@ class CoreEstimator {
   /// How much faster T + k sigma rises than T when heat is poured in.
   float burst_margin() const { return 1.0f + settings_.margin_sigmas * settings_.trust.power; }
   const HeatNetwork<double>& network() const { return network_; }
+  /// Of one step of 10 ms.
+  const Transition<double>& transition() const { return transition_; }
   /// The input of the last step as it was believed, ambient included.
   const HeatInput<>& input() const { return input_; }
 

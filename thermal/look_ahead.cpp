@@ -25,41 +25,68 @@ HeatInput<> future_input(const CoreEstimator& core, float current_A, const Phase
   return input;
 }
 
+/// Where the estimator stands, after a rest; what is over its limit already is said at once.
+Walk begin_walk(const CoreEstimator& core, double rest_s) {
+  const Estimate& now = core.estimate();
+  Walk walk;
+  walk.degC.resize(now.node_count);
+  for (int i = 0; i < now.node_count; ++i) {
+    walk.degC[i] = std::isfinite(now.max_degC[i]) ? static_cast<double>(now.margin_degC[i]) : now.degC[i];
+  }
+  if (rest_s > 0.0) {
+    walk.degC = core.network().step(core.network().transition(rest_s), walk.degC,
+                                    future_input(core, 0.0f, {{0.0f, 0.0f, 0.0f}}));
+  }
+  walk.forecast = {true, -infinity, infinity};
+  float least_room_K = infinity;
+  for (int i = 0; i < now.node_count; ++i) {
+    const float degC = static_cast<float>(walk.degC[i]), room_K = now.max_degC[i] - degC;
+    if (!std::isfinite(now.max_degC[i])) continue;
+    if (!(room_K >= least_room_K)) least_room_K = room_K, walk.forecast.peak_degC = degC;
+    if (!(room_K >= 0.0f)) walk.forecast.feasible = false, walk.forecast.limits_after_s = 0.0f;
+  }
+  return walk;
+}
+
+/// One step, or its first `left_s`; returns the seconds that were walked.
+double step_walk(Walk& walk, const CoreEstimator& core, const Transition<double>& t, const HeatInput<>& input,
+                 double left_s) {
+  const Estimate& now = core.estimate();
+  const HeatNetwork<double>::Vector next = core.network().step(t, walk.degC, input);
+  const double part = left_s < t.dt_s ? left_s / t.dt_s : 1.0;  // of the last step: a straight line within 10 ms
+  for (int i = 0; i < now.node_count; ++i) {
+    if (!std::isfinite(now.max_degC[i])) continue;
+    const double before = walk.degC[i], after = before + part * (next[i] - before),
+                 limit = static_cast<double>(now.max_degC[i]);
+    if (!(after <= static_cast<double>(walk.forecast.peak_degC))) walk.forecast.peak_degC = static_cast<float>(after);
+    if (after <= limit) continue;
+    const double within = after > before ? (limit - before) / (after - before) : 0.0;
+    const float at_s = static_cast<float>(walk.time_s + part * t.dt_s * (within > 0.0 ? within : 0.0));
+    if (!(at_s >= walk.forecast.limits_after_s)) walk.forecast.limits_after_s = at_s;
+    walk.forecast.feasible = false;
+  }
+  walk.degC += part * (next - walk.degC);
+  walk.time_s += part * t.dt_s;
+  return part * t.dt_s;
+}
+
+bool usable(const Piece& piece) {
+  return piece.seconds >= 0.0f && piece.seconds < 1e6f && std::abs(piece.current_A) < 1e4f;
+}
+
 }  // namespace
 
 LookAhead::LookAhead(const HeatNetwork<double>& network)
     : fine_(network.transition(0.01)), middle_(network.transition(0.1)), coarse_(network.transition(5.0)) {}
 
-LookAhead::Run LookAhead::begin(const CoreEstimator& core, double rest_s) const {
-  const Estimate& now = core.estimate();
-  Run run;
-  run.degC.resize(now.node_count);
-  for (int i = 0; i < now.node_count; ++i) {
-    run.degC[i] = std::isfinite(now.max_degC[i]) ? static_cast<double>(now.margin_degC[i]) : now.degC[i];
-  }
-  if (rest_s > 0.0) {
-    run.degC = core.network().step(core.network().transition(rest_s), run.degC,
-                                   future_input(core, 0.0f, {{0.0f, 0.0f, 0.0f}}));
-  }
-  run.forecast = {true, -infinity, infinity};
-  float least_room_K = infinity;
-  for (int i = 0; i < now.node_count; ++i) {
-    const float degC = static_cast<float>(run.degC[i]), room_K = now.max_degC[i] - degC;
-    if (!std::isfinite(now.max_degC[i])) continue;
-    if (!(room_K >= least_room_K)) least_room_K = room_K, run.forecast.peak_degC = degC;
-    if (!(room_K >= 0.0f)) run.forecast.feasible = false, run.forecast.limits_after_s = 0.0f;
-  }
-  return run;
-}
-
 /// Plays one piece; false when there is no more sense in going on (limit passed, or too long to look at).
-bool LookAhead::advance(Run& run, const CoreEstimator& core, const Piece& piece, const PhaseShares& shares) const {
-  const Estimate& now = core.estimate();
+bool LookAhead::advance(Walk& run, int& steps, const CoreEstimator& core, const Piece& piece,
+                        const PhaseShares& shares) const {
   const HeatInput<> input = future_input(core, piece.current_A, shares);
   double done_s = 0.0;
   const double whole_s = static_cast<double>(piece.seconds);
   while (done_s < whole_s) {
-    if (++run.steps > most_steps) {
+    if (++steps > most_steps) {
       run.forecast.feasible = false;
       run.forecast.limits_after_s = static_cast<float>(run.time_s);
       return false;
@@ -68,40 +95,26 @@ bool LookAhead::advance(Run& run, const CoreEstimator& core, const Piece& piece,
     const Transition<double>& t = done_s < 1.0 || left_s < 0.1    ? fine_
                                   : done_s < 20.0 || left_s < 5.0 ? middle_
                                                                   : coarse_;
-    const Vector next = core.network().step(t, run.degC, input);
-    const double part = left_s < t.dt_s ? left_s / t.dt_s : 1.0;  // of the last step: a straight line within 10 ms
-    for (int i = 0; i < now.node_count; ++i) {
-      if (!std::isfinite(now.max_degC[i])) continue;
-      const double before = run.degC[i], after = before + part * (next[i] - before),
-                   limit = static_cast<double>(now.max_degC[i]);
-      if (!(after <= static_cast<double>(run.forecast.peak_degC))) run.forecast.peak_degC = static_cast<float>(after);
-      if (after <= limit) continue;
-      const double within = after > before ? (limit - before) / (after - before) : 0.0;
-      const float at_s = static_cast<float>(run.time_s + part * t.dt_s * (within > 0.0 ? within : 0.0));
-      if (!(at_s >= run.forecast.limits_after_s)) run.forecast.limits_after_s = at_s;
-      run.forecast.feasible = false;
-    }
-    run.degC += part * (next - run.degC);
-    run.time_s += part * t.dt_s;
-    done_s += part * t.dt_s;
-    if (part < 1.0) break;
+    const double walked_s = step_walk(run, core, t, input, left_s);
+    done_s += walked_s;
+    if (walked_s < t.dt_s) break;
   }
   return true;
 }
 
 Forecast LookAhead::play_after(double rest_s, const CoreEstimator& core, const Piece* pieces, int count,
                                const PhaseShares& shares) const {
-  Run run = begin(core, rest_s);
+  Walk run = begin_walk(core, rest_s);
+  int steps = 0;
   for (int i = 0; i < count; ++i) {
     const Piece& piece = pieces[i];
-    const bool usable = piece.seconds >= 0.0f && piece.seconds < 1e6f && std::abs(piece.current_A) < 1e4f;
-    if (!usable) {
+    if (!usable(piece)) {
       run.forecast.feasible = false;
       if (!(run.forecast.limits_after_s <= static_cast<float>(run.time_s)))
         run.forecast.limits_after_s = static_cast<float>(run.time_s);
       break;
     }
-    if (!advance(run, core, piece, shares)) break;
+    if (!advance(run, steps, core, piece, shares)) break;
   }
   return run.forecast;
 }
@@ -143,6 +156,39 @@ float LookAhead::current_for_A(const CoreEstimator& core, float seconds, float m
     (fits(middle_A) ? good_A : bad_A) = middle_A;
   }
   return good_A;
+}
+
+bool ProfileRun::begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) {
+  if (count < 1 || count > most_pieces) return false;
+  float whole_s = 0.0f;
+  asked_As_ = before_As_ = done_s_ = 0.0;
+  for (int i = 0; i < count; ++i) {
+    if (!usable(pieces[i])) return false;
+    pieces_[i] = pieces[i];
+    whole_s += pieces[i].seconds;
+    asked_As_ += static_cast<double>(pieces[i].seconds * std::abs(pieces[i].current_A));
+  }
+  if (!(whole_s <= most_s)) return false;
+  count_ = count;
+  piece_ = 0;
+  shares_ = shares;
+  walk_ = begin_walk(core, 0.0);
+  return true;
+}
+
+bool ProfileRun::go_on(const CoreEstimator& core, int most_steps) {
+  for (int step = 0; step < most_steps && piece_ < count_; ++step) {
+    const Piece& piece = pieces_[piece_];
+    const double left_s = static_cast<double>(piece.seconds) - done_s_, from_s = walk_.time_s;
+    if (left_s > 0.0) {
+      const HeatInput<> input = future_input(core, piece.current_A, shares_);
+      done_s_ += step_walk(walk_, core, core.transition(), input, left_s);
+      const double until_s = std::fmin(walk_.time_s, static_cast<double>(walk_.forecast.limits_after_s));
+      if (until_s > from_s) before_As_ += (until_s - from_s) * static_cast<double>(std::abs(piece.current_A));
+    }
+    if (left_s <= core.transition().dt_s) ++piece_, done_s_ = 0.0;
+  }
+  return piece_ == count_;
 }
 
 }  // namespace thermal

@@ -7,7 +7,8 @@
 //
 // Steps of 10 ms in the first second of a piece, 0.1 s to 20 s, 5 s beyond; at most most_steps a run: every call is
 // bounded. On the board for the main loop (milliseconds at 168 MHz), not for a lane. Knows no slopes: it asks whether
-// the demand itself fits, not what the governor would make of it.
+// the demand itself fits, not what the governor would make of it. A ProfileRun answers the first question alone, in
+// slices short enough to stand between two steps of a lane.
 #pragma once
 
 #include "thermal/core_estimator.hpp"
@@ -27,6 +28,13 @@ struct Forecast {
   float limits_after_s;  // +infinity when feasible
 };
 
+/// Temperatures on their way through a profile.
+struct Walk {
+  HeatNetwork<double>::Vector degC;
+  double time_s = 0.0;
+  Forecast forecast{};
+};
+
 class LookAhead {
  public:
   explicit LookAhead(const HeatNetwork<double>& network);
@@ -44,21 +52,39 @@ class LookAhead {
   float current_for_A(const CoreEstimator& core, float seconds, float max_A, const PhaseShares& shares) const;
 
  private:
-  using Vector = HeatNetwork<double>::Vector;
   static constexpr int most_steps = 2000;
 
-  struct Run {
-    Vector degC;
-    double time_s = 0.0;
-    int steps = 0;
-    Forecast forecast{};
-  };
-  Run begin(const CoreEstimator& core, double rest_s) const;
-  bool advance(Run& run, const CoreEstimator& core, const Piece& piece, const PhaseShares& shares) const;
+  bool advance(Walk& run, int& steps, const CoreEstimator& core, const Piece& piece, const PhaseShares& shares) const;
   Forecast play_after(double rest_s, const CoreEstimator& core, const Piece* pieces, int count,
                       const PhaseShares& shares) const;
 
   Transition<double> fine_, middle_, coarse_;
+};
+
+/// A profile played in slices, in the estimator's own steps of 10 ms. The estimator may step on in between: the run
+/// began at its temperatures and keeps its own.
+class ProfileRun {
+ public:
+  static constexpr int most_pieces = 16;
+  static constexpr float most_s = 60.0f;
+
+  /// False: no piece, a piece that is not one, or longer than most_s.
+  bool begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares);
+  /// Up to so many steps; true: played to its end.
+  bool go_on(const CoreEstimator& core, int most_steps);
+
+  /// After the end; not feasible: when the limit is first passed.
+  const Forecast& forecast() const { return walk_.forecast; }
+  /// Of the ampere-seconds asked for, those before a limit is passed. A governor delivers more: it goes on with less.
+  float share_before_limit() const { return asked_As_ > 0.0 ? static_cast<float>(before_As_ / asked_As_) : 1.0f; }
+
+ private:
+  Walk walk_;
+  Piece pieces_[most_pieces]{};
+  PhaseShares shares_{};
+  int count_ = 0, piece_ = 0;
+  double done_s_ = 0.0;  // of the present piece
+  double asked_As_ = 0.0, before_As_ = 0.0;
 };
 
 }  // namespace thermal

@@ -4,8 +4,8 @@
 //
 // The PC asks, the board answers each request once, with the request's sequence number and its kind + 0x80; only
 // telemetry comes unasked. Every answer begins with Answer; unless its status is `done`, nothing else follows. The
-// board answers in order of arrival but for save, commit, load, calibrate and ask: those take time and are answered
-// when they are done; one of them at a time (status busy).
+// board answers in order of arrival but for commit, save, load and ask: those take time and are answered when they are
+// done; one of them at a time, and nothing can be staged meanwhile (status busy).
 //
 // A list fills the rest of the payload: its length says how many. Texts stand behind the struct, each ended by NUL.
 #pragma once
@@ -51,7 +51,7 @@ enum class Kind : std::uint8_t {        // request                            an
   state              = 0x14,            // -                                  State
   fault              = 0x15,            // Axes                               FaultEvidence        of the lowest axis named
   calibrate          = 0x16,            // Axes                               Offsets              of the lowest axis named
-  ask                = 0x17,            // Ask + Segment[]                    Outlook
+  ask                = 0x17,            // Ask + Segment[]                    Outlook              up to 60 s
   subscribe          = 0x20,            // Subscribe + SignalAddress[]        Answer               none: end
   capture            = 0x21,            // CaptureOrder + SignalAddress[]     Answer               none: end
   capture_status     = 0x22,            // -                                  CaptureStatus
@@ -101,7 +101,8 @@ struct Segment {
 };
 struct Ask {
   std::uint8_t axis;
-  std::uint8_t zero[3]{};
+  std::uint8_t standing;  // 0: it turns, all phases share; 1: wherever it stands, each phase as if it were the hottest
+  std::uint16_t zero = 0;
 };
 inline constexpr int max_segments = 16;
 
@@ -218,10 +219,9 @@ struct Outlook {
   Answer answer;
   std::uint8_t feasible;  // 0: the governor would hold it back
   std::uint8_t zero[3]{};
-  float peak_degC;        // of the node that comes closest to its limit, if nobody held it back
-  float limits_after_s;   // +infinity when feasible
-  float wait_s;           // rest until it is feasible; +infinity: not within hours
-  float delivered_share;  // of the current-seconds asked for that would be delivered from now, 0..1
+  float peak_degC;           // of the node that comes closest to its limit, if nobody held it back
+  float limits_after_s;      // +infinity when feasible
+  float share_before_limit;  // of the ampere-seconds asked for, 0..1; the governor delivers more: it goes on with less
 };
 
 enum class CapturePhase : std::uint8_t { idle = 0, waiting = 1, filling = 2, complete = 3 };
@@ -298,7 +298,7 @@ HOTCORE_AT(State, axis, 12);
 HOTCORE_SIZE(FaultEvidence, 20);
 HOTCORE_AT(FaultEvidence, value, 8);
 HOTCORE_SIZE(Offsets, 16);
-HOTCORE_SIZE(Outlook, 24);
+HOTCORE_SIZE(Outlook, 20);
 HOTCORE_AT(Outlook, peak_degC, 8);
 HOTCORE_SIZE(CaptureStatus, 16);
 HOTCORE_AT(CaptureStatus, rows, 6);

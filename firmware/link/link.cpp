@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include "firmware/link/link.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace firmware {
+
+/// A new host, or the same one after a bus reset: it waits for nothing that was asked before.
+void Link::restart() {
+  reader_.restart();
+  held_ = held_count_ = sent_ = queued_ = 0;
+  errand_wanted_ = false;
+}
+
+void Link::take(const std::uint8_t* data, std::size_t bytes) {
+  held_ = 0;
+  held_count_ = std::min(bytes, sizeof held_packet_);
+  std::memcpy(held_packet_, data, held_count_);
+  digest();
+}
+
+std::size_t Link::give(std::uint8_t* out, std::size_t room) {
+  if (errand_.load(std::memory_order_relaxed) == Errand::done && has_room()) return_errand();
+  digest();
+  if (queued_ - sent_ < room) {
+    Reply rows;
+    if (has_room() && commands_.telemetry(rows))
+      send(static_cast<std::uint8_t>(wire::Kind::telemetry), telemetry_sequence_++, rows);
+  }
+  const std::size_t bytes = std::min(room, queued_ - sent_);
+  std::memcpy(out, queue_ + sent_, bytes);
+  sent_ += bytes;
+  return bytes;
+}
+
+/// What came and was not looked at yet, as long as answers have room.
+void Link::digest() {
+  while (held_ < held_count_ && has_room()) {
+    if (reader_.take(held_packet_[held_++])) obey(reader_.frame());
+  }
+}
+
+void Link::obey(const wire::Frame& request) {
+  Reply reply;
+  if (Commands::well_formed(request, reply)) {
+    if (Commands::is_errand(request.kind))
+      take_errand(request, reply);
+    else
+      commands_.answer(request, parameters_free(), reply);
+  }
+  if (reply.count() > 0) send(static_cast<std::uint8_t>(request.kind | wire::reply_bit), request.sequence, reply);
+}
+
+void Link::send(std::uint8_t kind, std::uint8_t sequence, const Reply& reply) {
+  if (sizeof queue_ - queued_ < wire::max_encoded) {
+    std::memmove(queue_, queue_ + sent_, queued_ - sent_);
+    queued_ -= sent_;
+    sent_ = 0;
+  }
+  queued_ += wire::encode({kind, sequence, reply.count(), reply.bytes()}, queue_ + queued_, sizeof queue_ - queued_);
+}
+
+void Link::take_errand(const wire::Frame& request, Reply& reply) {
+  if (errand_.load(std::memory_order_relaxed) != Errand::none) return reply.refuse(wire::Status::busy);
+  errand_kind_ = request.kind;
+  errand_sequence_ = request.sequence;
+  errand_bytes_ = request.bytes;
+  std::memcpy(errand_payload_, request.payload, request.bytes);
+  errand_wanted_ = true;
+  std::atomic_signal_fence(std::memory_order_release);
+  errand_.store(Errand::asked, std::memory_order_relaxed);
+}
+
+void Link::return_errand() {
+  std::atomic_signal_fence(std::memory_order_acquire);
+  if (errand_wanted_) {
+    Reply reply;
+    reply.append(errand_answer_, errand_answer_bytes_);
+    send(static_cast<std::uint8_t>(errand_kind_ | wire::reply_bit), errand_sequence_, reply);
+  }
+  errand_.store(Errand::none, std::memory_order_relaxed);
+}
+
+bool Link::parameters_free() const {
+  return errand_.load(std::memory_order_relaxed) != Errand::asked ||
+         static_cast<wire::Kind>(errand_kind_) == wire::Kind::ask;
+}
+
+wire::Answer Link::load() {
+  const auto from = static_cast<wire::LoadFrom>(errand_payload_[0]);
+  if (from > wire::LoadFrom::defaults) return {static_cast<std::uint8_t>(wire::Status::out_of_range)};
+  return commands_.parameters().load(from);
+}
+
+/// Main context: a slice of the forecast at each call.
+void Link::look_ahead() {
+  constexpr int steps_a_slice = 10;
+  wire::Ask ask{};
+  std::memcpy(&ask, errand_payload_, sizeof ask);
+  if (ask.axis >= axis_count)
+    return finish(wire::Answer{static_cast<std::uint8_t>(wire::Status::no_such_axis), ask.axis, 0});
+  const thermal::CoreEstimator& core = commands_.driver().axis(ask.axis).core();
+  if (!looking_ahead_) {
+    constexpr float standing = 1.0f, turning = 0.5f;  // mean(i_k^2) / |i|^2
+    const float share = ask.standing != 0 ? standing : turning;
+    const thermal::PhaseShares shares{{share, share, share}};
+    thermal::Piece pieces[wire::max_segments]{};
+    const int count = static_cast<int>((errand_bytes_ - sizeof ask) / sizeof(wire::Segment));
+    for (int i = 0; i < count; ++i) {
+      wire::Segment segment{};
+      std::memcpy(&segment, errand_payload_ + sizeof ask + static_cast<std::size_t>(i) * sizeof segment,
+                  sizeof segment);
+      pieces[i] = {segment.seconds, segment.current_A};
+    }
+    if (!profile_.begin(core, pieces, count, shares))
+      return finish(wire::Answer{static_cast<std::uint8_t>(wire::Status::out_of_range), ask.axis, 0});
+    looking_ahead_ = true;
+    return;
+  }
+  if (!profile_.go_on(core, steps_a_slice)) return;
+  looking_ahead_ = false;
+  const thermal::Forecast& seen = profile_.forecast();
+  finish(wire::Outlook{{},
+                       static_cast<std::uint8_t>(seen.feasible),
+                       {},
+                       seen.peak_degC,
+                       seen.limits_after_s,
+                       profile_.share_before_limit()});
+}
+
+}  // namespace firmware

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: MIT
+// The device as hosts meet it: descriptors against byte tables of the specifications, the sequences of Linux and
+// Windows, and requests that must be refused.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/usb/host.hpp"
+
+namespace {
+
+using namespace usb_host;
+
+constexpr std::uint8_t get_descriptor = 6;
+constexpr std::uint16_t device_type = 0x0100, configuration_type = 0x0200, string_type = 0x0300, qualifier = 0x0600,
+                        bos_type = 0x0F00;
+
+struct Enumeration : testing::Test {
+  VirtualBoard board{options()};
+  std::uint8_t address = 0;
+
+  void SetUp() override {
+    board.bus().plug();
+    board.bus().reset();
+  }
+  void TearDown() override { EXPECT_EQ(board.violation(), nullptr) << board.violation(); }
+
+  Transfer ask(std::uint8_t type, std::uint8_t request, std::uint16_t value, std::uint16_t index, std::uint16_t length,
+               const Bytes& data = {}) {
+    return control(board.bus(), address, {type, request, value, index, length}, data);
+  }
+  Transfer descriptor(std::uint16_t value, std::uint16_t length, std::uint16_t index = 0) {
+    return ask(0x80, get_descriptor, value, index, length);
+  }
+  void move_to(std::uint8_t to) {
+    ASSERT_TRUE(ask(0x00, 5, to, 0, 0));
+    address = to;
+  }
+  void configure() {
+    move_to(3);
+    ASSERT_TRUE(ask(0x00, 9, 1, 0, 0));
+  }
+};
+
+// USB 2.0 table 9-8, field by field; class triple of the IAD ECN; bcdUSB 2.01 announces a BOS (USB 3.2, 9.6.2).
+TEST_F(Enumeration, DeviceDescriptorIsTheTableOfTheSpecification) {
+  EXPECT_EQ(descriptor(device_type, 18),
+            (Bytes{18, 1, 0x01, 0x02, 0xEF, 0x02, 0x01, 64, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 3, 1}));
+}
+
+// USB 2.0 tables 9-10, 9-12, 9-13; IAD ECN table 9-Z; CDC 1.2 tables 15, 16; PSTN 1.2 tables 3, 4.
+TEST_F(Enumeration, ConfigurationDescriptorIsTheTableOfTheSpecification) {
+  const Bytes expected{9, 2,    98,   0,    3,    1,    0,    0xC0, 0,                       //
+                       9, 4,    0,    0,    2,    0xFF, 0,    0,    4,                       // vendor
+                       7, 5,    0x01, 2,    64,   0,    0,    7,    5, 0x81, 2, 64,   0, 0,  //
+                       8, 0x0B, 1,    2,    2,    2,    0,    5,                             // association
+                       9, 4,    1,    0,    1,    2,    2,    0,    5,                       // communication class
+                       5, 0x24, 0,    0x20, 0x01, 5,    0x24, 1,    0, 2,    4, 0x24, 2, 2, 5, 0x24, 6, 1, 2,  //
+                       7, 5,    0x82, 3,    8,    0,    16,                                                    //
+                       9, 4,    2,    0,    2,    0x0A, 0,    0,    0,  // data class
+                       7, 5,    0x03, 2,    64,   0,    0,    7,    5, 0x83, 2, 64,   0, 0};
+  ASSERT_EQ(expected.size(), 98u);
+  EXPECT_EQ(descriptor(configuration_type, 255), expected);
+  EXPECT_EQ(descriptor(configuration_type, 9), Bytes(expected.begin(), expected.begin() + 9));
+}
+
+// Microsoft OS 2.0 Descriptors Specification: table 4 (platform capability), 3 (Windows version).
+TEST_F(Enumeration, BosNamesTheMicrosoftSet) {
+  EXPECT_EQ(descriptor(bos_type, 255),
+            (Bytes{5,    0x0F, 33,   0,    1,                                                                       //
+                   28,   0x10, 5,    0,    0xDF, 0x60, 0xDD, 0xD8, 0x89, 0x45, 0xC7, 0x4C, 0x9C, 0xD2, 0x65, 0x9D,  //
+                   0x9E, 0x64, 0x8A, 0x9F, 0x00, 0x00, 0x03, 0x06, 0xB2, 0x00, 0x20, 0x00}));
+}
+
+// Microsoft OS 2.0 Descriptors Specification: tables 10 to 15. 178 bytes for one GUID, as in everybody's example.
+TEST_F(Enumeration, MicrosoftSetIsTheTableOfTheSpecification) {
+  Bytes expected{0x0A, 0, 0, 0, 0x00, 0x00, 0x03, 0x06, 0xB2, 0,                                  //
+                 0x08, 0, 1, 0, 0,    0,    0xA8, 0,                                              //
+                 0x08, 0, 2, 0, 0,    0,    0xA0, 0,                                              //
+                 0x14, 0, 3, 0, 'W',  'I',  'N',  'U',  'S',  'B', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,  //
+                 0x84, 0, 4, 0, 7,    0,    0x2A, 0};
+  const auto utf16 = [&](const char* text) {
+    for (; *text != 0; ++text) expected.push_back(static_cast<std::uint8_t>(*text)), expected.push_back(0);
+    expected.push_back(0), expected.push_back(0);
+  };
+  utf16("DeviceInterfaceGUIDs");
+  expected.push_back(0x50), expected.push_back(0);
+  utf16("{6F1D2B60-9E0B-4E43-9D5C-4B2C5D0A7E31}");
+  expected.push_back(0), expected.push_back(0);
+  ASSERT_EQ(expected.size(), 178u);
+  EXPECT_EQ(ask(0xC0, 0x20, 0, 7, 178), expected);
+  EXPECT_EQ(ask(0xC0, 0x20, 0, 7, 0xFFFF), expected);
+  EXPECT_FALSE(ask(0xC0, 0x20, 0, 8, 178));
+  EXPECT_FALSE(ask(0xC0, 0x21, 0, 7, 178));
+}
+
+TEST_F(Enumeration, StringsAreTextsInUtf16) {
+  EXPECT_EQ(descriptor(string_type, 255), (Bytes{4, 3, 0x09, 0x04}));
+  EXPECT_EQ(descriptor(string_type | 3, 255, 0x0409), (Bytes{10, 3, 'S', 0, 'I', 0, 'M', 0, '0', 0}));
+  for (const int text : {0x0301, 0x0302, 0x0304, 0x0305})
+    EXPECT_TRUE(descriptor(static_cast<std::uint16_t>(text), 255, 0x0409)) << text;
+  EXPECT_FALSE(descriptor(string_type | 6, 255, 0x0409));
+  EXPECT_FALSE(descriptor(string_type | 0xEE, 18)) << "MS OS 1.0 is not offered";
+  EXPECT_FALSE(descriptor(string_type | 3, 255, 0x0407)) << "no German";
+}
+
+/// As drivers/usb/core/hub.c and config.c of Linux 6.1 ask a new full-speed device.
+TEST_F(Enumeration, GoesAsLinuxDoesIt) {
+  ASSERT_TRUE(descriptor(device_type, 64));
+  EXPECT_EQ(descriptor(device_type, 64)->size(), 18u);
+  board.bus().reset();
+  move_to(7);
+  ASSERT_TRUE(descriptor(device_type, 18));
+  EXPECT_EQ(descriptor(bos_type, 5), (Bytes{5, 15, 33, 0, 1}));
+  EXPECT_EQ(descriptor(bos_type, 33)->size(), 33u);
+  EXPECT_FALSE(descriptor(qualifier, 10)) << "full speed only: refused, USB 2.0 9.6.2";
+  const Transfer head = descriptor(configuration_type, 9);
+  ASSERT_TRUE(head);
+  const std::uint16_t all = static_cast<std::uint16_t>((*head)[2] | (*head)[3] << 8);
+  EXPECT_EQ(descriptor(configuration_type, all)->size(), all);
+  for (const int text : {0x0302, 0x0301, 0x0303})
+    EXPECT_TRUE(descriptor(static_cast<std::uint16_t>(text), 255, 0x0409));
+  ASSERT_TRUE(ask(0x00, 9, 1, 0, 0));
+  EXPECT_TRUE(board.bus().present());
+  EXPECT_EQ(ask(0x80, 8, 0, 0, 1), Bytes{1});
+  // cdc-acm: line coding, line state.
+  EXPECT_TRUE(ask(0x21, 0x20, 0, 1, 7, {0x80, 0x25, 0, 0, 0, 0, 8}));
+  EXPECT_EQ(ask(0xA1, 0x21, 0, 1, 7), (Bytes{0x80, 0x25, 0, 0, 0, 0, 8}));
+  EXPECT_TRUE(ask(0x21, 0x22, 3, 1, 0));
+}
+
+/// As Windows 10 asks: 64 bytes at address 0 cut short by a reset, whole configuration, BOS, MS OS 2.0 set.
+TEST_F(Enumeration, GoesAsWindowsDoesIt) {
+  const Request first{0x80, get_descriptor, device_type, 0, 64};
+  ASSERT_EQ(board.bus().setup(0, first.raw().data()), Handshake::ack);
+  board.bus().reset();
+  move_to(1);
+  EXPECT_EQ(descriptor(device_type, 18)->size(), 18u);
+  EXPECT_EQ(descriptor(configuration_type, 255)->size(), 98u);
+  EXPECT_EQ(descriptor(bos_type, 5)->size(), 5u);
+  EXPECT_EQ(descriptor(bos_type, 33)->size(), 33u);
+  EXPECT_EQ(ask(0xC0, 0x20, 0, 7, 0xB2)->size(), 0xB2u);
+  EXPECT_TRUE(descriptor(string_type, 255));
+  EXPECT_TRUE(descriptor(string_type | 2, 255, 0x0409));
+  EXPECT_FALSE(descriptor(qualifier, 10));
+  EXPECT_EQ(ask(0x80, 0, 0, 0, 2), (Bytes{1, 0}));
+  EXPECT_TRUE(ask(0x00, 9, 1, 0, 0));
+}
+
+TEST_F(Enumeration, AnAnswerThatFillsItsPacketsEndsWithAnEmptyOne) {
+  // 128 bytes of the MS set are asked with room for 128: no empty packet; the configuration is 98 = 64 + 34.
+  EXPECT_EQ(ask(0xC0, 0x20, 0, 7, 128)->size(), 128u);
+  EXPECT_EQ(ask(0xC0, 0x20, 0, 7, 64)->size(), 64u);
+  // No descriptor of this device is a multiple of 64; that such a one would end rightly is shown on the state machine.
+  const firmware::usb::Identity identity{"b", "f", "0123456789012345678901234567890"};  // string of 64 bytes
+  firmware::usb::Control c(identity);
+  const Request r{0x80, get_descriptor, string_type | 3, 0x0409, 255};
+  ASSERT_EQ(c.setup(r.raw().data()), firmware::usb::Order::answer);
+  firmware::usb::Bytes packet{};
+  ASSERT_TRUE(c.next_packet(packet));
+  EXPECT_EQ(packet.count, 64);
+  ASSERT_TRUE(c.next_packet(packet));
+  EXPECT_EQ(packet.count, 0);
+  EXPECT_FALSE(c.next_packet(packet));
+}
+
+TEST_F(Enumeration, RefusesWhatIsNotOnTheWhitelist) {
+  configure();
+  const Request bad[] = {
+      {0x00, 5, 128, 0, 0},      // address out of range
+      {0x00, 5, 4, 0, 0},        // address while configured
+      {0x00, 5, 4, 1, 0},        // index
+      {0x00, 9, 2, 0, 0},        // no such configuration
+      {0x00, 9, 1, 0, 1},        // length
+      {0x80, 8, 0, 0, 2},        // length
+      {0x80, 0, 0, 0, 3},        // length
+      {0x80, 0, 1, 0, 2},        // value
+      {0x81, 0, 0, 3, 2},        // interface
+      {0x82, 0, 0, 0x84, 2},     // endpoint
+      {0x82, 0, 0, 0x0181, 2},   // endpoint with a high byte
+      {0x02, 3, 0, 0x00, 0},     // endpoint 0 never halts
+      {0x02, 3, 1, 0x81, 0},     // feature
+      {0x02, 1, 0, 0x04, 0},     // endpoint
+      {0x00, 3, 1, 0, 0},        // remote wake-up is not offered
+      {0x00, 3, 2, 0x0100, 0},   // test mode is for high speed
+      {0x81, 10, 0, 3, 1},       // interface
+      {0x01, 11, 1, 0, 0},       // alternate setting
+      {0x01, 11, 0, 3, 0},       // interface
+      {0x21, 0x20, 0, 1, 8},     // length
+      {0x21, 0x20, 0, 2, 7},     // interface
+      {0x21, 0x22, 4, 1, 0},     // value
+      {0x21, 0x23, 0, 1, 0},     // break
+      {0x40, 0x20, 0, 7, 0},     // direction
+      {0x80, 6, 0x0101, 0, 18},  // index of a device descriptor
+      {0x80, 6, 0x0100, 1, 18},  // language of one
+      {0x80, 7, 0x0100, 0, 18},  // SET_DESCRIPTOR
+      {0xFF, 0xFF, 0xFFFF, 0xFFFF, 0xFFFF},
+  };
+  for (const Request& r : bad) {
+    EXPECT_FALSE(control(board.bus(), address, r))
+        << std::hex << int{r.type} << ' ' << int{r.request} << ' ' << r.value << ' ' << r.index << ' ' << r.length;
+    EXPECT_TRUE(descriptor(device_type, 18)) << "the next SETUP ends the stall";
+  }
+  EXPECT_FALSE(ask(0x21, 0x20, 0, 1, 7, {1, 2, 3})) << "a data stage shorter than announced";
+  EXPECT_TRUE(descriptor(device_type, 18));
+}
+
+TEST_F(Enumeration, NothingButEndpointZeroWorksBeforeConfiguration) {
+  EXPECT_FALSE(ask(0x00, 9, 1, 0, 0)) << "no configuration at address 0";
+  move_to(3);
+  EXPECT_FALSE(ask(0x21, 0x22, 1, 1, 0));
+  EXPECT_FALSE(ask(0x82, 0, 0, 0x81, 2));
+  EXPECT_FALSE(ask(0x81, 0, 0, 0, 2));
+  EXPECT_FALSE(ask(0x01, 11, 0, 0, 0));
+  EXPECT_EQ(ask(0x80, 8, 0, 0, 1), Bytes{0});
+  EXPECT_EQ(board.bus().out(address, 0x01, false, Bytes{1}), Handshake::none);
+}
+
+TEST_F(Enumeration, HaltAndItsEndSetTheToggleBack) {
+  configure();
+  Program program(board);
+  const Bytes half = Program::framed(wire::Kind::state, 1, {});
+  ASSERT_EQ(board.bus().out(address, 0x01, false, half), Handshake::ack);
+  EXPECT_TRUE(board.bus().toggle(0x01));
+  ASSERT_TRUE(ask(0x02, 3, 0, 0x01, 0));
+  EXPECT_EQ(board.bus().out(address, 0x01, true, half), Handshake::stall);
+  EXPECT_EQ(ask(0x82, 0, 0, 0x01, 2), (Bytes{1, 0}));
+  ASSERT_TRUE(ask(0x02, 1, 0, 0x01, 0));
+  EXPECT_EQ(ask(0x82, 0, 0, 0x01, 2), (Bytes{0, 0}));
+  EXPECT_FALSE(board.bus().toggle(0x01));
+  EXPECT_EQ(board.bus().out(address, 0x01, false, half), Handshake::ack) << "armed again";
+
+  ASSERT_TRUE(ask(0x02, 3, 0, 0x81, 0));
+  boards::host::UsbBus<VirtualBoard::Device>::Packet packet;
+  EXPECT_EQ(board.bus().in(address, 0x81, packet), Handshake::stall);
+  ASSERT_TRUE(ask(0x02, 1, 0, 0x81, 0));
+  EXPECT_EQ(board.bus().in(address, 0x81, packet), Handshake::ack) << "the answer that waited is sent";
+  EXPECT_FALSE(packet.data1);
+  ASSERT_TRUE(ask(0x01, 11, 0, 0, 0)) << "SET_INTERFACE";
+  EXPECT_FALSE(board.bus().toggle(0x81));
+}
+
+TEST_F(Enumeration, ABusResetEndsEverything) {
+  configure();
+  ASSERT_TRUE(ask(0x02, 3, 0, 0x81, 0));
+  board.bus().reset();
+  address = 0;
+  EXPECT_EQ(board.bus().out(3, 0x01, false, Bytes{1}), Handshake::none);
+  configure();
+  EXPECT_EQ(ask(0x82, 0, 0, 0x81, 2), (Bytes{0, 0}));
+}
+
+TEST_F(Enumeration, ASuspendedDeviceGoesOnWhereItWas) {
+  configure();
+  board.bus().suspend();
+  board.advance(400);
+  board.bus().resume();
+  EXPECT_EQ(ask(0x80, 8, 0, 0, 1), Bytes{1});
+  Program program(board);
+}
+
+}  // namespace
