@@ -32,6 +32,7 @@ struct HiddenLogOptions {
       0.1;  // teeth, yoke, frame as share of host-sim's defaults: how far the clean motor is from two nodes
   double seconds = 1200;
   bool small_ones = false;  // eleven small effects besides
+  bool noisy = true;        // false: the same log as the sensors would read it without noise and steps
   // A further log of the same motor with the same effect, sized as before: another duty and noise from this seed, or
   // this profile played.
   std::uint64_t again = 0;

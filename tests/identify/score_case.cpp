@@ -95,7 +95,7 @@ double separability(const Problem& problem, const std::vector<std::string>& trut
     if (std::find(truth.begin(), truth.end(), cause.id) != truth.end() || !clean.possible(cause) ||
         cause.edit == identify::Edit::cooling_of_log)
       continue;
-    D = std::min(D, 2 * identify::fit(clean, {{static_cast<int>(c), -1}}, &base).misfit);
+    D = std::min(D, 2 * identify::fit(clean, {{static_cast<int>(c), -1}}, {&base}).misfit);
   }
   return D;
 }
