@@ -63,6 +63,7 @@ class Adc : public Device {
   /// Overrides what a conversion yields (stuck or wild sensor); negative: the pin decides.
   void force(int channel, int counts) { forced_[static_cast<std::size_t>(channel)] = counts; }
   std::uint64_t injected_done() const { return done_; }
+  double sampling_s(int channel) const { return sample_cycles(channel) * to_s(clock()); }
 
  protected:
   std::uint32_t on_read(std::uint32_t offset) override;

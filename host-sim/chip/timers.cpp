@@ -114,8 +114,11 @@ std::uint32_t AdvancedTimer::position() const {
 
 Time AdvancedTimer::next_event() const { return running_ ? std::min({overflow_, underflow_, compare_}) : never; }
 
+/// The match is a rising edge of OC4REF: PWM mode 2 on the way up, mode 1 on the way down (17.3.9).
 bool AdvancedTimer::compare4_works() const {
-  return running_ && (peek(ccer) >> 12 & 1) && field(peek(ccmr2), 8, 2) == 0 && field(peek(ccmr2), 12, 3) >= 6;
+  const bool up = !centre_aligned() || field(peek(cr1), 5, 2) >= 2;
+  return running_ && (peek(ccer) >> 12 & 1) && field(peek(ccmr2), 8, 2) == 0 &&
+         field(peek(ccmr2), 12, 3) == (up ? 7u : 6u);
 }
 
 void AdvancedTimer::advance(Time now) {

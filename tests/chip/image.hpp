@@ -17,7 +17,9 @@
 
 namespace image_tests {
 
-inline const std::string image = std::string(HOTCORE_SOURCE_DIR) + "/build/h8-15d/bin/h8-15d.elf";
+inline const std::string image = std::getenv("HOTCORE_IMAGE")
+                                     ? std::getenv("HOTCORE_IMAGE")  // a mutant
+                                     : std::string(HOTCORE_SOURCE_DIR) + "/build/h8-15d/bin/h8-15d.elf";
 inline const std::string order_image = std::string(HOTCORE_SOURCE_DIR) + "/build/h8-15d/bin/nvic-order.elf";
 
 #define NEEDS_IMAGE(path)                                                                              \

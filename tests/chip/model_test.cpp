@@ -33,7 +33,7 @@ struct Bench : ::testing::Test {
     write(tim1 + 0x2C, 800);
     write(tim1 + 0x30, 1);
     write(tim1 + 0x18, 0x6868);
-    write(tim1 + 0x1C, 0x6868);
+    write(tim1 + 0x1C, 0x7868);
     write(tim1 + 0x20, 0x1555);
     write(tim1 + 0x40, 790);
     write(tim1 + 0x14, 1);

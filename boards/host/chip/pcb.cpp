@@ -41,6 +41,9 @@ constexpr AnalogPin analog_wiring[] = {{0, {'A', 0}},  {1, {'A', 1}},  {2, {'A',
                                        {12, {'C', 2}}, {13, {'C', 3}}, {14, {'C', 4}}, {15, {'C', 5}}};
 constexpr std::uint32_t current_zero = 2048, reference_counts = 1502, idle_force_counts = 100;
 constexpr double settling_s = 1e-6;
+// A cold thermistor lets the divider's 10 kohm feed the sampling capacitor: 16 kohm with the switch, 7 pF, a quarter of
+// a count (STM32F405 datasheet, ADC characteristics, equation 1).
+constexpr double thermistor_sampling_s = 16e3 * 7e-12 * 9.7;
 
 }  // namespace
 
@@ -122,6 +125,8 @@ hal::Duty Pcb::gates(int axis, std::string* complaint) const {
     }
     ratio[k] = static_cast<float>(leg.upper_ratio);
   }
+  if (complaint && chip.port(w.fault.port).pull(w.fault.number) != 1)
+    *complaint = "nFAULT is open-drain: nothing pulls it up";
   if (complaint && std::fabs(timer.period_s() - pwm_period_s_) > 1e-3 * pwm_period_s_)
     *complaint = "the PWM period is not the board's 50 us";
   if (complaint && !timer.centre_aligned())
@@ -171,7 +176,7 @@ void Pcb::move_pins(int axis) {
   chip.set_pin(wiring[axis].index, raw.encoder_counts % 4096 == 0);
 }
 
-std::uint32_t Pcb::analog(int, int channel, Time closed) {
+std::uint32_t Pcb::analog(int adc, int channel, Time closed) {
   for (const AnalogPin& a : analog_wiring) {
     if (a.channel == channel && chip.port(a.pin.port).mode(a.pin.number) != PinMode::analog) {
       chip.report("a channel is converted whose pin is not in analog mode", 0x40012000);
@@ -191,6 +196,8 @@ std::uint32_t Pcb::analog(int, int channel, Time closed) {
     }
     return bench.raw(axis).current_counts[static_cast<std::size_t>(phase)];
   }
+  if ((channel == 4 || channel == 5 || channel == 14) && chip.adc(adc).sampling_s(channel) < thermistor_sampling_s)
+    chip.report("a thermistor is sampled for too short a time", 0x40012000);
   switch (channel) {
     case 3:
       return bench.board_raw().bus_voltage_counts;
