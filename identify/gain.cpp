@@ -97,10 +97,11 @@ struct Answers {
 };
 
 /// What a board that runs `believed` says and does. `burst_A` 0: not asked yet.
-Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::HeatSet<double>& truth,
-                   const thermal::HeatInput<>& work, double most_A, double burst_A) {
+Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::Trust& trust,
+                   const thermal::HeatSet<double>& truth, const thermal::HeatInput<>& work, double most_A,
+                   double burst_A) {
   thermal::EstimatorSettings settings;
-  settings.trust = thermal::identified_trust;
+  settings.trust = trust;
   Plant plant(truth, resting(work));
   CoreEstimator core(believed, settings);
   const thermal::Reading ambient{static_cast<float>(work[Boundary::ambient]), true};
@@ -141,12 +142,13 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
   if (!thermal::validate(before_set, estimator_dt_s).ok() || !thermal::validate(truth, estimator_dt_s).ok())
     return std::nullopt;
   const thermal::HeatInput<> work = working_point(problem);
+  const thermal::Trust trust = trust_of(extended);
   const double most_A = 50 * problem.rms_A;
-  const double continuous_A = answers_of(truth, truth, work, most_A, 0).continuous_A;
+  const double continuous_A = answers_of(truth, trust, truth, work, most_A, 0).continuous_A;
   if (!(continuous_A > 0)) return std::nullopt;
   const double burst_A = burst_over_continuous * continuous_A;
-  const Answers before = answers_of(before_set, truth, work, most_A, burst_A),
-                after = answers_of(truth, truth, work, most_A, burst_A);
+  const Answers before = answers_of(before_set, trust_of(baseline), truth, work, most_A, burst_A),
+                after = answers_of(truth, trust, truth, work, most_A, burst_A);
   const double direct = std::sqrt(3.0) / 2;  // amperes as the log has them
   return Gain{before.overshoot_K,           after.overshoot_K,           before.burst_s,   after.burst_s,
               before.continuous_A * direct, after.continuous_A * direct, burst_A * direct, work[Drive::speed_rad_per_s],

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -29,6 +30,16 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
         winding ? static_cast<float>(problem.belief.winding_max_degC) : std::numeric_limits<float>::infinity();
   }
   return set;
+}
+
+thermal::Trust trust_of(const Fit& f) {
+  const Eigen::VectorXd sd = f.std_errors();
+  const double inflation = std::max(1.0, std::sqrt(2 * f.misfit / std::max(1, f.readings)));
+  const auto share = [&](int coordinate, float least) {
+    return std::clamp(static_cast<float>(sd[coordinate] * inflation), least, 0.5f);
+  };
+  return {share(2, thermal::identified_trust.power), share(0, thermal::identified_trust.inner_resistance),
+          share(1, thermal::identified_trust.cooling)};
 }
 
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {
@@ -62,6 +73,9 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   }
   s += fmt::format("\n[housing_sensor]\nnode = {}\nlag_s = {:.6g}\noffset_K = {:.6g}\ngain_error = {:.6g}\n",
                    int{set.housing.node}, set.housing.lag_s, set.housing.offset_K, set.housing.gain_error);
+  const thermal::Trust trust = trust_of(f);
+  s += fmt::format("\n[trust]\npower = {:.3f}\ninner_resistance = {:.3f}\ncooling = {:.3f}\n", trust.power,
+                   trust.inner_resistance, trust.cooling);
   std::string recording;
   if (m.offset) recording += fmt::format("current_offset_A = {:.6g}\n", m.current_offset_A);
   if (m.delayed) recording += fmt::format("delay_s = {:.6g}\n", m.delay_s);

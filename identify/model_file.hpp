@@ -7,11 +7,16 @@
 #include <string>
 
 #include "identify/fit.hpp"
+#include "thermal/core_estimator.hpp"
 
 namespace identify {
 
 /// The set itself, with the winding's limit.
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& fit);
+
+/// How far the board may trust the set: standard errors of the fit, widened where it leaves more than noise, and never
+/// better than what such a fit is worth (thermal::identified_trust).
+thermal::Trust trust_of(const Fit& fit);
 
 /// `sentence`: what was found, written as a comment at the top.
 std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence);

@@ -73,9 +73,9 @@ int each(const std::string& path, const toml::table& file, const char* name, int
 
 }  // namespace
 
-thermal::HeatSet<double> read_heat_set(const std::string& path) {
+HeatModel read_heat_model(const std::string& path) {
   const toml::table file = wire::pc::parse_toml(wire::pc::find_toml("heat model", path, "."));
-  known_keys(path, file, {"format", "node", "link", "source", "housing_sensor", "recording"});
+  known_keys(path, file, {"format", "node", "link", "source", "housing_sensor", "trust", "recording"});
   if (file["format"].value_or(0) != 1) refuse(path + ": format must be 1; write the model again with this identify.");
 
   thermal::HeatSet<double> set{};
@@ -112,7 +112,19 @@ thermal::HeatSet<double> read_heat_set(const std::string& path) {
         fmt::format("{}: the network cannot be used (problem {} at entry {}); see SetProblem in thermal/validate.hpp.",
                     path, static_cast<int>(check.problem), check.index));
   }
-  return set;
+
+  HeatModel model{set, {}};
+  if (const toml::table* trust = file["trust"].as_table()) {
+    const std::string place = path + ": trust";
+    known_keys(place, *trust, {"power", "inner_resistance", "cooling"});
+    const auto share = [&](const char* key) {
+      const double value = number(place, *trust, key, required);
+      if (!(value >= 0 && value <= 1)) refuse(fmt::format("{}: {} = {} is no share from 0 to 1.", place, key, value));
+      return static_cast<float>(value);
+    };
+    model.trust = thermal::Trust{share("power"), share("inner_resistance"), share("cooling")};
+  }
+  return model;
 }
 
 }  // namespace boards::host

@@ -183,15 +183,21 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
   const firmware::BoardRating rating = rating_of(scene.board);
   firmware::AxisSetup axis;
   axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
-  axis.heat = scene.model.empty() ? thermal::three_phase_set(known)
-                                  : thermal::split_phases(read_heat_set(scene.model), known.phase_coupling_W_per_K);
+  std::optional<thermal::Trust> of_the_fit;
+  if (scene.model.empty()) {
+    axis.heat = thermal::three_phase_set(known);
+  } else {
+    const HeatModel model = read_heat_model(scene.model);
+    axis.heat = thermal::split_phases(model.set, known.phase_coupling_W_per_K);
+    of_the_fit = model.trust;
+  }
   if (limiter != Limiter::governor) {
     for (thermal::Node<double>& node : axis.heat.nodes) {
       if (std::isfinite(node.max_degC)) node.max_degC = static_cast<float>(no_limit_degC);
     }
   }
   axis.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
-                         : scene.trust == "identified" ? thermal::identified_trust
+                         : scene.trust == "identified" ? of_the_fit.value_or(thermal::identified_trust)
                                                        : thermal::exact_trust;
   return {rating, {axis, axis}};
 }

@@ -47,7 +47,8 @@ struct Scene {
   std::string id, title, note;
   std::string motor = "ec-16-40w";
   std::string board = "h8-15d";  // rating of the power stage: h8-15d or h8-17.5d
-  std::string trust = "exact";   // in the motor's thermal values: exact (the simulated motor's own), identified, sheet
+  std::string trust = "exact";   // in the motor's thermal values: exact (the simulated motor's own), identified (as the
+                                 // model says), sheet
   std::string model;             // a heat-network file of identify that the firmware runs; empty: from the motor
   double seconds = 1;
   double log_Hz = 1000;

@@ -42,7 +42,7 @@ std::string written(const std::string& text) {
 std::string complaint(std::string text, const std::string& from, const std::string& to) {
   text.replace(text.find(from), from.size(), to);
   try {
-    boards::host::read_heat_set(written(text));
+    boards::host::read_heat_model(written(text));
   } catch (const wire::pc::UserError& error) {
     EXPECT_EQ(error.exit_code(), 2);
     return error.what();
@@ -61,8 +61,23 @@ TEST(HeatFile, TheFirmwareRunsTheModelAsItRunsTheSheet) {
   EXPECT_NEAR(by_model.traces[0].hottest_true_degC, by_sheet.traces[0].hottest_true_degC, 0.3);
 }
 
+TEST(HeatFile, AnUncertainModelIsRunMoreCautiously) {
+  const std::string scenes = HOTCORE_SOURCE_DIR "/host-sim/scenes";
+  const boards::host::RunOptions options{.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors"};
+  const auto hottest_degC = [&](const std::string& trust) {
+    const std::string model = written(model_text() + trust);
+    const auto scene = boards::host::read_scene("get-up", scenes, {"seconds=2", "trust=identified", "model=" + model});
+    return boards::host::run_scene(scene, options).traces[0].hottest_true_degC;
+  };
+  const double typical = hottest_degC(""),
+               unsure = hottest_degC("[trust]\npower = 0.1\ninner_resistance = 0.1\ncooling = 0.1\n");
+  EXPECT_LT(unsure, typical - 10) << "two standard deviations of a tenth of the rise, less what is typical";
+  EXPECT_NE(complaint(model_text() + "[trust]\npower = 2\n", "power = 2", "power = 3").find("trust"),
+            std::string::npos);
+}
+
 TEST(HeatFile, SplitPhasesEquallyHeatedAreTheLumpedWinding) {
-  const thermal::HeatSet<double> lumped = boards::host::read_heat_set(written(model_text()));
+  const thermal::HeatSet<double> lumped = boards::host::read_heat_model(written(model_text())).set;
   const thermal::HeatSet<double> split = thermal::split_phases(lumped, 0);
   ASSERT_EQ(split.node_count, lumped.node_count + 2);
   const thermal::HeatNetwork<double> one(lumped), three(split);
