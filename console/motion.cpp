@@ -105,19 +105,17 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
   if (outlook.feasible != 0) {
     text = fmt::format("Yes: the hottest winding would reach {:.1f} degC.\n", outlook.peak_degC);
   } else {
-    text = fmt::format("Not in full: {:.0f} % would be delivered; the limit is met after {:.2f} s",
-                       100 * outlook.delivered_share, outlook.limits_after_s);
+    text =
+        fmt::format("Not in full: the limit is met after {:.2f} s and {:.0f} % of it; from there on less is delivered",
+                    outlook.limits_after_s, 100 * outlook.share_before_limit);
     text += std::isfinite(outlook.peak_degC)
                 ? fmt::format(" (unlimited, the winding would reach {:.0f} degC).\n", outlook.peak_degC)
                 : ".\n";
-    text += std::isfinite(outlook.wait_s) ? fmt::format("Rest for {:.1f} s first and it fits.\n", outlook.wait_s)
-                                          : "No rest makes it fit; ask for less.\n";
   }
   console.say(text, {{"feasible", outlook.feasible != 0},
                      {"peak_degC", number(outlook.peak_degC)},
                      {"limits_after_s", number(outlook.limits_after_s)},
-                     {"wait_s", number(outlook.wait_s)},
-                     {"delivered_share", number(outlook.delivered_share)}});
+                     {"share_before_limit", number(outlook.share_before_limit)}});
 }
 
 }  // namespace

@@ -318,7 +318,7 @@ void Commands::capture(const wire::Frame& request, Reply& reply) {
     if (!trigger.place.exists()) return reply.refuse(Status::no_such_signal, order.trigger.axis, order.trigger.id);
   }
   const std::uint32_t rows = static_cast<std::uint32_t>(order.pre) + order.post;
-  if (rows * selection.row_words() > Recorder::capture_words) return reply.refuse(Status::no_room);
+  if (rows * selection.row_words() > Recorder::capture_words) return reply.refuse(Status::capture_too_long);
   recorder_.capture(selection, trigger, order.pre, order.post);
   reply.put(wire::Answer{});
 }

@@ -144,8 +144,8 @@ TEST_F(Commands, AFaultIsToldWithEvidenceAndAdvice) {
 TEST_F(Commands, AskSaysWhatWouldHappen) {
   const auto outlook = json("ask \"20A 0.3s, 6A 5s\"");
   EXPECT_FALSE(outlook["feasible"]);
-  EXPECT_EQ(outlook["wait_s"], 12.5);
-  EXPECT_NE(say("ask \"20A 0.3s\"").out.find("Rest for 12.5 s"), std::string::npos);
+  EXPECT_NEAR(outlook["share_before_limit"].get<double>(), 0.8, 1e-6);
+  EXPECT_NE(say("ask \"20A 0.3s\"").out.find("after 0.21 s"), std::string::npos);
 }
 
 TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }

@@ -238,7 +238,7 @@ struct FakeBoard {
         add(payload, wire::Offsets{{}, {0.01f, -0.02f, 0.03f}});
         break;
       case wire::Kind::ask:
-        add(payload, wire::Outlook{{}, 0, {}, 171.0f, 0.21f, 12.5f, 0.8f});
+        add(payload, wire::Outlook{{}, 0, {}, 171.0f, 0.21f, 0.8f});
         break;
       case wire::Kind::subscribe:
         watched_ = list<wire::SignalAddress>(frame, sizeof(wire::Subscribe));

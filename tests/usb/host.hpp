@@ -75,16 +75,16 @@ Transfer control(Bus& bus, std::uint8_t address, const Request& r, const Bytes& 
 /// A program at the link of one board, whose time it passes.
 class Program {
  public:
-  explicit Program(VirtualBoard& board) : board_(board) {}
+  explicit Program(VirtualBoard& board) : board_(&board) {}
 
   /// From the plug to "configured", in the fewest steps.
   void connect() {
-    board_.bus().plug();
-    board_.bus().reset();
+    board_->bus().plug();
+    board_->bus().reset();
     out_data1_ = in_data1_ = false;
     reader_.restart();
-    ASSERT_TRUE(control(board_.bus(), 0, {0x00, 5, address, 0, 0}));
-    ASSERT_TRUE(control(board_.bus(), address, {0x00, 9, 1, 0, 0}));
+    ASSERT_TRUE(control(board_->bus(), 0, {0x00, 5, address, 0, 0}));
+    ASSERT_TRUE(control(board_->bus(), address, {0x00, 9, 1, 0, 0}));
   }
 
   void write(const Bytes& bytes) { to_send_.insert(to_send_.end(), bytes.begin(), bytes.end()); }
@@ -104,13 +104,13 @@ class Program {
     if (!to_send_.empty()) {
       const std::size_t bytes = std::min<std::size_t>(to_send_.size(), hal::usb_packet_bytes);
       const Bytes packet(to_send_.begin(), to_send_.begin() + static_cast<long>(bytes));
-      if (board_.bus().out(address, wire::link_out_endpoint, out_data1_, packet) == Handshake::ack) {
+      if (board_->bus().out(address, wire::link_out_endpoint, out_data1_, packet) == Handshake::ack) {
         out_data1_ = !out_data1_;
         to_send_.erase(to_send_.begin(), to_send_.begin() + static_cast<long>(bytes));
       }
     }
     typename boards::host::UsbBus<VirtualBoard::Device>::Packet packet;
-    if (board_.bus().in(address, wire::link_in_endpoint, packet) != Handshake::ack) return;
+    if (board_->bus().in(address, wire::link_in_endpoint, packet) != Handshake::ack) return;
     EXPECT_EQ(packet.data1, in_data1_);
     in_data1_ = !in_data1_;
     for (const std::uint8_t byte : packet.view()) {
@@ -135,7 +135,7 @@ class Program {
         if ((heard.kind & wire::reply_bit) != 0 && heard.sequence == sequence_) return heard;
         if (heard.kind == static_cast<std::uint8_t>(wire::Kind::telemetry)) telemetry.push_back(heard.payload);
       }
-      board_.advance(1);
+      board_->advance(1);
     }
     return {};
   }
@@ -159,7 +159,7 @@ class Program {
   void pass(int periods) {
     for (int i = 0; i < periods; ++i) {
       exchange();
-      board_.advance(1);
+      board_->advance(1);
     }
   }
   std::deque<Heard>& frames() { return frames_; }
@@ -168,7 +168,7 @@ class Program {
   static constexpr std::uint8_t address = 5;
 
  private:
-  VirtualBoard& board_;
+  VirtualBoard* board_;
   wire::FrameReader reader_;
   std::deque<std::uint8_t> to_send_;
   std::deque<Heard> frames_;
