@@ -65,7 +65,7 @@ void Axis::restore(const AxisMemory& memory) {
   core_.restore(memory.heat, -1.0);
   const wire::Fault fault = memory.fault.fault;
   const bool judged_anew = fault == wire::Fault::parameters || fault == wire::Fault::clock_lost;
-  if (fault != wire::Fault::none && !judged_anew && mode_ == Mode::off) (void)trip(memory.fault);
+  if (fault != wire::Fault::none && !judged_anew) hold(memory.fault);
 }
 
 /// A board or a heat set that cannot be is refused with id 0; a heat set without nodes is one that was never given.

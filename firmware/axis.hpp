@@ -96,7 +96,9 @@ class Axis {
   /// The same without a memory: hot until something proves otherwise.
   void start_hot() { core_.start_hot(); }
   /// Before the control interrupt runs: stays tripped, for this reason.
-  void hold(const FaultRecord& why) { (void)trip(why); }
+  void hold(const FaultRecord& why) {
+    if (mode_ != Mode::tripped) (void)trip(why);
+  }
 
   /// Control interrupt, every PWM period, also while off: the duty for the next period.
   [[nodiscard]] hal::Duty tick(const hal::AxisSample& sample) noexcept;

@@ -26,6 +26,7 @@ constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached 
 constexpr float enough_movement_K = 3.0f, alive_share = 0.5f, stuck_share = 0.25f;
 constexpr float start_sigma_K = 15.0f;
 constexpr float restored_hotter_K = 10.0f;
+constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
 // Drift of the ambient: 10 K in 20 min, at most 10 K off while it is observed; it also takes up cooling that differs
@@ -74,12 +75,16 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
   due_K_ = Row::Zero(n_ + 5);
   widen_all();
-  // Soaked: whatever the housing turns out to be, the winding is too.
+  soak();
+  publish();
+}
+
+/// Whatever the housing turns out to be, the winding is too.
+void CoreEstimator::soak() {
   p_.topLeftCorner(n_, n_).setConstant(squared(start_sigma_K));
   p_.row(sensor()) = p_.row(housing_.node);
   p_.col(sensor()) = p_.col(housing_.node);
   p_(sensor(), sensor()) = squared(start_sigma_K);
-  publish();
 }
 
 /// Nothing is known about the temperatures but the state itself; the parameters stay what the trust says.
@@ -390,8 +395,12 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
     sum_degC += degC_[i];
     ++windings;
   }
+  bool soaked = true;
+  for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
+  if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+  publish();
 }
 
 void CoreEstimator::start_hot() {

@@ -117,6 +117,7 @@ class CoreEstimator {
   using Row = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_states, 1>;
 
   void widen_all();
+  void soak();
   double hottest_limit_degC() const;
   void begin_anew(const float (&sigma_K)[max_nodes]);
   bool take_input(const HeatInput<>& input);

@@ -20,10 +20,6 @@ constexpr std::uint32_t slow_channels[] = {vrefint_channel, ntc_channel[0], ntc_
 constexpr int slow_count = 5;
 constexpr std::uint32_t paint = 0xC0DEC0DE;
 
-const std::uint8_t* flash_at(std::uint32_t sector) {
-  return reinterpret_cast<const std::uint8_t*>(sector_address(sector));
-}
-
 /// NTC to ground under a pull-up, read against its own supply. Open or short is no temperature.
 hal::Temperature temperature_of(std::uint16_t counts) {
   if (counts < 40 || counts > 4055) return {0.0f, false};  // beyond -25 and above 200 degC with 10k / 3950 K
@@ -39,30 +35,44 @@ std::uint32_t stack_left() {
   return 4 * words;
 }
 
-/// Backup memory takes words only (the model insists, silicon would not).
-void copy_words(std::uint32_t to, const void* from, std::uint32_t bytes) {
-  for (std::uint32_t at = 0; at < bytes; at += 4) {
-    std::uint32_t word;
-    std::memcpy(&word, static_cast<const std::uint8_t*>(from) + at, 4);
-    reg(to + at) = word;
-  }
-}
-
 }  // namespace
 
 namespace h8_15d {
 
+Application::Application()
+    : found_(parameters_.start(parameter_flash_)),
+      driver_({rating, {setup_from(parameters_.in_force().axes[0]), setup_from(parameters_.in_force().axes[1])}, {}}) {}
+
 void Application::prepare(std::uint32_t reset_flags, bool clock_good) {
-  reset_flags_ = static_cast<std::uint8_t>(reset_flags >> 24);
   door = {};
   door.reset_flags = reset_flags;
   for (std::uint32_t i = 0; i < 3; ++i) door.unique_id[i] = reg(unique_id + 4 * i);
-  recall_heat(reset_flags);
+  door.parameters = found_;
+  door.saved_serial = parameters_.saved_serial();
   good_ = clock_good_ = clock_good;
+  remember();
   if (!good_) return;
   stage_.set_up();
   for (int i = 0; i < 2; ++i) find_rotor(i);
   good_ = stage_.start();
+}
+
+/// Why not to arm, the gravest first, and how hot it was. Before the watchdogs run.
+void Application::remember() {
+  const auto why = static_cast<wire::Status>(found_.status);
+  const bool no_set = why == wire::Status::parameter_refused || why == wire::Status::newer_record;
+  for (int i = 0; i < 2; ++i) {
+    if (!clock_good_) driver_.axis(i).hold({wire::Fault::clock_lost});
+    if (no_set) driver_.axis(i).hold({wire::Fault::parameters, 0, 0.0f, static_cast<float>(found_.id)});
+  }
+  firmware::DriverMemory memory;
+  const Recalled from = keeper_.recall(memory);
+  door.restored = static_cast<std::uint32_t>(from);
+  if (from == Recalled::nothing)
+    driver_.start_hot();
+  else
+    driver_.restore(memory);
+  keeper_.keep(driver_.memory());
 }
 
 /// Where the rotor stands before the first index pulse: on the pulse itself, or somewhere in a Hall sector.
@@ -77,7 +87,7 @@ void Application::find_rotor(int axis) {
   for (int k = 0; k < 3; ++k) hall |= static_cast<std::uint32_t>(read_pin(pins[axis].hall[k])) << k;
   // Switch k is high for half an electrical turn from 120 k degrees: six sectors; here the middle of each, in turns.
   constexpr float middle_turns[8] = {-1.0f, 1.5f / 6, 3.5f / 6, 2.5f / 6, 5.5f / 6, 0.5f / 6, 4.5f / 6, -1.0f};
-  const float pole_pairs = pole_pairs_[axis];
+  const float pole_pairs = parameters_.in_force().axes[axis].drive.pole_pairs_count;
   if (middle_turns[hall] < 0.0f || !(pole_pairs >= 1.0f))
     return;  // no such sector: not trusted, the axis refuses to arm
   const auto counts = static_cast<std::uint32_t>(middle_turns[hall] / pole_pairs * static_cast<float>(encoder_counts));
@@ -118,12 +128,7 @@ void Application::supply_falls() {
   // The fast lane has nothing left to drive and would run late behind the flash; if the supply comes back, the window
   // watchdog, which nobody feeds any more, starts everything anew.
   reg(system::nvic_icer) = bit(adc_irq.irq);
-  const HeatRecord last = heat_now();
-  if (journal_room_ < sizeof last) return;
-  std::uint32_t words[sizeof last / 4];
-  std::memcpy(words, &last, sizeof last);
-  program_flash(journal_at_, words, sizeof last / 4);
-  journal_room_ = 0;  // once
+  keeper_.last_words(good_);
 }
 
 // ---- main loop
@@ -206,8 +211,7 @@ void Application::slow_lane() {
     door.lost_samples[i] = stage_.lost(i);
   }
   if (slow_ticks_ % 100 == 1) door.stack_left_bytes = stack_left();
-  const HeatRecord now = heat_now();
-  copy_words(backup_ram, &now, sizeof now);
+  keeper_.keep(driver_.memory());
 }
 
 void Application::look_at_door() {
@@ -218,6 +222,11 @@ void Application::look_at_door() {
       if (in.axes >> i & 1)
         door.answer[i] = static_cast<std::uint32_t>(driver_.axis(i).set_current({in.id_A[i], in.iq_A[i]}));
     }
+  }
+  if (in.order_serial != door_order_) {
+    door_order_ = in.order_serial;
+    door.order_answer = obey(door);
+    door.saved_serial = parameters_.saved_serial();
   }
   if (in.wish_serial == door_wish_) return;
   door_wish_ = in.wish_serial;
@@ -238,52 +247,19 @@ void Application::look_at_door() {
   }
 }
 
-// ---- what survives
-// ----------------------------------------------------------------------------------------------------
-
-HeatRecord Application::heat_now() const {
-  HeatRecord r{};
-  for (int i = 0; i < 2; ++i) {
-    const firmware::AxisState& state = driver_.axis(i).state();
-    for (int k = 0; k < 3; ++k) r.payload.core_degC[i][k] = state.core_degC[k];
-    r.payload.housing_degC[i] = state.housing_degC;
-    r.payload.fault[i] = static_cast<std::uint8_t>(state.fault.fault);
+wire::Answer Application::obey(const Door& in) {
+  switch (in.order) {
+    case order_get:
+      return {static_cast<std::uint8_t>(parameters_.get(in.assignment.address, door.order_value))};
+    case order_stage:
+      return parameters_.stage(in.assignment);
+    case order_commit:
+      return parameters_.commit(driver_);
+    case order_save:
+      return parameters_.save(driver_, parameter_flash_);
+    default:
+      return {static_cast<std::uint8_t>(wire::Status::unknown_parameter)};
   }
-  r.payload.reset_flags = reset_flags_;
-  r.seal(heat_serial_ + slow_ticks_ + 1);
-  return r;
-}
-
-/// Before the watchdogs run: a journal sector that is full may be erased here, which takes a second, and nowhere else.
-void Application::recall_heat(std::uint32_t) {
-  HeatRecord kept;
-  std::uint32_t words[sizeof kept / 4];
-  for (std::uint32_t i = 0; i < sizeof kept / 4; ++i) words[i] = reg(backup_ram + 4 * i);
-  std::memcpy(&kept, words, sizeof kept);
-  const HeatRecord* journal = nullptr;
-  int last_sector = 0;
-  for (int i = 0; i < 2; ++i) {
-    const HeatRecord* one = newest<HeatRecord>(flash_at(journal_sectors[i]), sector_bytes);
-    if (one && (!journal || static_cast<std::int32_t>(one->header.serial - journal->header.serial) > 0)) {
-      journal = one;
-      last_sector = i;
-    }
-  }
-  if (kept.whole()) {
-    door.restored = 1;
-    heat_serial_ = kept.header.serial;
-  } else if (journal) {
-    door.restored = 2;
-    heat_serial_ = journal->header.serial;
-  }
-  std::size_t at = free_slot<HeatRecord>(flash_at(journal_sectors[last_sector]), sector_bytes);
-  if (at + 4 * sizeof(HeatRecord) > sector_bytes) {
-    last_sector = 1 - last_sector;
-    erase_sector(journal_sectors[last_sector]);
-    at = 0;
-  }
-  journal_at_ = sector_address(journal_sectors[last_sector]) + at;
-  journal_room_ = sector_bytes - at;
 }
 
 }  // namespace h8_15d

@@ -14,17 +14,16 @@
 #include <cstdint>
 
 #include "boards/h8-15d/door.hpp"
+#include "boards/h8-15d/heat_keeper.hpp"
 #include "boards/h8-15d/power_stage.hpp"
 #include "boards/h8-15d/store.hpp"
-#include "firmware/driver.hpp"
+#include "firmware/parameter_store.hpp"
 
 namespace h8_15d {
 
 class Application {
  public:
-  explicit Application(const firmware::DriverSetup& setup)
-      : driver_(setup),
-        pole_pairs_{setup.axes[0].parameters.pole_pairs_count, setup.axes[1].parameters.pole_pairs_count} {}
+  Application();
 
   void prepare(std::uint32_t reset_flags, bool clock_good);
   [[noreturn]] void run();
@@ -40,11 +39,14 @@ class Application {
   void slow_lane();
   void read_slow_channel();
   void look_at_door();
-  void recall_heat(std::uint32_t reset_flags);
-  HeatRecord heat_now() const;
+  wire::Answer obey(const Door& order);
+  void remember();
 
+  FlashStore parameter_flash_{parameter_sectors};
+  firmware::ParameterStore parameters_{rating};
+  wire::Answer found_;  // what the saved parameters were worth
   firmware::Driver driver_;
-  float pole_pairs_[2];
+  HeatKeeper keeper_;
   PowerStage stage_;
   std::atomic<std::uint32_t> milliseconds_{0};
   std::atomic<std::uint32_t> fast_ticks_[2]{};
@@ -53,9 +55,7 @@ class Application {
   bool good_ = false, clock_good_ = false;
   int slow_channel_ = 0, force_axis_ = 0;
   hal::Temperature housing_[2]{}, power_stage_{};
-  std::uint32_t door_serial_ = 0, door_wish_ = 0;
-  std::uint32_t journal_at_ = 0, journal_room_ = 0, heat_serial_ = 0;
-  std::uint8_t reset_flags_ = 0;
+  std::uint32_t door_serial_ = 0, door_wish_ = 0, door_order_ = 0;
 };
 
 }  // namespace h8_15d

@@ -7,10 +7,14 @@
 #include <cstdint>
 
 #include "firmware/driver.hpp"
+#include "wire/protocol.hpp"
 
 namespace h8_15d {
 
 enum DoorWish : std::uint32_t { wish_none = 0, wish_arm = 1, wish_disarm = 2, wish_clear = 3 };
+
+/// What firmware/parameter_store.hpp can do, by its own names.
+enum DoorOrder : std::uint32_t { order_get = 1, order_stage = 2, order_commit = 3, order_save = 4 };
 
 struct Door {
   static constexpr std::uint32_t open = 0x524F4F44;  // "DOOR"
@@ -22,13 +26,20 @@ struct Door {
   float id_A[2], iq_A[2];
   std::uint32_t wish_serial;  // raise last: each new number is one wish
   std::uint32_t wish[2];
+  std::uint32_t order_serial;  // raise last: each new number is one order about the parameters
+  std::uint32_t order;
+  wire::Assignment assignment;
   // Out.
   std::uint32_t answer[2];    // wire::Status of the last wish
   std::uint32_t reset_flags;  // RCC_CSR at the start
   std::uint32_t unique_id[3];
   std::uint32_t slow_ticks, lost_samples[2], stack_left_bytes;
   float vdda_V, bus_A, force_V[2];
-  std::uint32_t restored;  // 1: heat from the backup memory, 2: from the journal, 0: none
+  std::uint32_t restored;      // Recalled: 1 heat from the backup memory, 2 from the journal, 0 none: started hot
+  wire::Answer parameters;     // what was found in flash at the start
+  wire::Answer order_answer;   // of the last order
+  float order_value;           // that order_get asked for
+  std::uint32_t saved_serial;  // of the parameter record in flash, 0: none
   firmware::AxisState axis[2];
 };
 

@@ -145,33 +145,41 @@ void all_gates_off() {
   clear(tim::tim8 + tim::bdtr, bit(15));
 }
 
-bool program_flash(std::uint32_t address, const std::uint32_t* words, std::uint32_t count) {
-  if (reg(flash::cr) & bit(31)) {
-    reg(flash::keyr) = 0x45670123;  // 3.6.1
-    reg(flash::keyr) = 0xCDEF89AB;
-  }
-  reg(flash::cr) = 2u << 8 | 1u;  // PSIZE = x32, PG
-  bool good = true;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    reg(address + 4 * i) = words[i];
-    while (reg(flash::sr) & bit(16)) {  // BSY
-    }
-    good = good && reg(address + 4 * i) == words[i];
-  }
+namespace {
+void unlock_flash() {
+  if (!(reg(flash::cr) & bit(31))) return;
+  reg(flash::keyr) = 0x45670123;  // 3.6.1
+  reg(flash::keyr) = 0xCDEF89AB;
+}
+
+/// The data cache may still hold what stood there before (3.5.2); it can be reset only while it is off (3.9.1).
+void lock_flash() {
   reg(flash::cr) = bit(31);  // LOCK
-  return good;
+  const std::uint32_t acr = reg(flash::acr);
+  reg(flash::acr) = acr & ~bit(10);              // DCEN
+  reg(flash::acr) = (acr & ~bit(10)) | bit(12);  // DCRST
+  reg(flash::acr) = acr;
+  asm volatile("" ::: "memory");
+}
+}  // namespace
+
+bool program_flash(std::uint32_t address, std::uint32_t word) {
+  unlock_flash();
+  reg(flash::cr) = 2u << 8 | 1u;  // PSIZE = x32, PG
+  reg(address) = word;
+  while (reg(flash::sr) & bit(16)) {  // BSY
+  }
+  lock_flash();
+  return reg(address) == word;
 }
 
 bool erase_sector(std::uint32_t sector) {
-  if (reg(flash::cr) & bit(31)) {
-    reg(flash::keyr) = 0x45670123;
-    reg(flash::keyr) = 0xCDEF89AB;
-  }
+  unlock_flash();
   reg(flash::cr) = 2u << 8 | sector << 3 | bit(1);  // SER, SNB
   set(flash::cr, bit(16));                          // STRT
   while (reg(flash::sr) & bit(16)) {
   }
-  reg(flash::cr) = bit(31);
+  lock_flash();
   return reg(sector_address(sector)) == 0xFFFFFFFFu;
 }
 

@@ -36,9 +36,9 @@ inline bool read_pin(Pin p) { return (reg(gpio::base(p.port) + gpio::idr) & bit(
 /// Both bridges open and both gate drivers off, from anywhere, with nothing but stores.
 void all_gates_off();
 
-/// Programs words into erased flash. Only with both bridges open and before or after control: the core stands still for
-/// 16..100 us a word. ISR only for the last record when the supply goes.
-bool program_flash(std::uint32_t address, const std::uint32_t* words, std::uint32_t count);
+/// Programs one word of erased flash and reads it back. Only with both bridges open: the core stands still for 16..100
+/// us. ISR only for the last record when the supply goes.
+bool program_flash(std::uint32_t address, std::uint32_t word);
 /// Takes a second or two; only before the watchdogs run.
 bool erase_sector(std::uint32_t sector);
 

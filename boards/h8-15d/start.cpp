@@ -28,22 +28,6 @@ using namespace h8_15d;
 alignas(Application) unsigned char application_storage[sizeof(Application)];
 Application* application = nullptr;
 
-/// The newest whole record of the parameter sectors; without one, a set that refuses to arm.
-firmware::DriverSetup setup_from_flash() {
-  firmware::DriverSetup setup{};
-  setup.rating = rating;
-  const ParameterRecord* best = nullptr;
-  for (const std::uint32_t sector : parameter_sectors) {
-    const auto* region = reinterpret_cast<const std::uint8_t*>(sector_address(sector));
-    const ParameterRecord* one = newest<ParameterRecord>(region, sector_bytes);
-    if (one && (!best || static_cast<std::int32_t>(one->header.serial - best->header.serial) > 0)) best = one;
-  }
-  if (best) {
-    for (int i = 0; i < 2; ++i) setup.axes[i] = best->payload.axes[i];
-  }
-  return setup;
-}
-
 [[noreturn]] void sleep_for_ever() {
   for (;;) asm volatile("wfi");
 }
@@ -74,7 +58,7 @@ extern "C" {
     bring_up_encoders();
     bring_up_usb_pins();
   }
-  application = new (application_storage) Application(setup_from_flash());
+  application = new (application_storage) Application();
   application->prepare(reset_flags, clock_good);
   application->run();
 }

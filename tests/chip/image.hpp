@@ -12,7 +12,6 @@
 
 #include "boards/h8-15d/board.hpp"
 #include "boards/host/chip/pcb.hpp"
-#include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
 
 namespace image_tests {
@@ -47,11 +46,11 @@ inline host_sim::BenchDesign design_of(const Options& o) {
   return d;
 }
 
-inline void setup_of(const Options& o, firmware::AxisSetup (&setup)[2]) {
+inline void setup_of(const Options& o, firmware::AxisSet (&setup)[2]) {
   const wire::Motor sheet = wire::pc::read_motor(o.motor, std::string(HOTCORE_SOURCE_DIR) + "/boards/motors").motor;
   for (auto& s : setup) {
-    s.parameters = firmware::parameters_from(sheet, h8_15d::rating, {48.0f, 0.0f});
-    s.heat = thermal::three_phase_set(sheet);
+    s.drive = firmware::parameters_from(sheet, h8_15d::rating, {48.0f, 0.0f});
+    s.heat = firmware::heat_parameters_from(sheet, thermal::sheet_trust);
   }
 }
 
@@ -59,7 +58,7 @@ inline std::unique_ptr<boards::Pcb> board(const Options& o = {}) {
   auto pcb = std::make_unique<boards::Pcb>(design_of(o), o.seed);
   pcb->flash_image(image);
   if (o.parameters) {
-    firmware::AxisSetup setup[2];
+    firmware::AxisSet setup[2];
     setup_of(o, setup);
     pcb->flash_parameters(setup);
   }

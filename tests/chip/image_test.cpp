@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "boards/h8-15d/heat_keeper.hpp"
+
 namespace image_tests {
 namespace {
 
@@ -126,13 +128,13 @@ TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
   for (const double electrical_turns : {0.05, 0.30, 0.47, 0.70, 0.95}) {
     auto pcb = std::make_unique<Pcb>(design_of({}), 1);
     pcb->flash_image(image);
-    firmware::AxisSetup setup[2];
+    firmware::AxisSet setup[2];
     setup_of({}, setup);
     pcb->flash_parameters(setup);
     for (int i = 0; i < 2; ++i) {
       pcb->bench.load(i).mode = host_sim::Load::Mode::locked;
       pcb->bench.motor(i).place(
-          electrical_turns * 2 * host_sim::pi / static_cast<double>(setup[i].parameters.pole_pairs_count), 0);
+          electrical_turns * 2 * host_sim::pi / static_cast<double>(setup[i].drive.pole_pairs_count), 0);
     }
     pcb->power_on();
     ASSERT_TRUE(pcb->arm()) << electrical_turns;
@@ -212,32 +214,9 @@ TEST(Image, ASagOfTheLogicSupplyOpensTheGatesAndSavesTheHeat) {
   EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
   EXPECT_FALSE(pcb->chip.port('B').drives_high(9) || pcb->chip.port('B').drives_high(2)) << "and the drivers are off";
   pcb->run_for(0.001);
-  EXPECT_EQ(pcb->chip.flash.words_programmed() - words, sizeof(h8_15d::HeatRecord) / 4);
+  EXPECT_EQ(pcb->chip.flash.words_programmed() - words, h8_15d::HeatKeeper::record_words);
   EXPECT_TRUE(pcb->chip.flash.peek(Flash::cr) >> 31) << "locked again";
   NO_TROUBLE(*pcb);
-}
-
-TEST(Image, APowerCutInEachWordOfTheJournalLeavesTheLastRecordOrTheOneBefore) {
-  NEEDS_IMAGE(image);
-  for (int cut = 0; cut <= static_cast<int>(sizeof(h8_15d::HeatRecord) / 4); ++cut) {
-    auto pcb = board();
-    pcb->run_for(0.03);
-    pcb->chip.set_supply(2.8);
-    pcb->run_for(0.002);  // record 1 is whole
-    pcb->chip.set_supply(3.3);
-    pcb->power_on(5);  // VBAT gone too: only the journal remembers
-    pcb->run_for(0.03);
-    EXPECT_EQ(pcb->door().restored, 2u);
-    const auto words = pcb->chip.flash.words_programmed();
-    pcb->chip.set_supply(2.8);
-    for (int i = 0; i < 4000 && pcb->chip.flash.words_programmed() < words + static_cast<std::uint64_t>(cut); ++i)
-      pcb->chip.run_for(1e-6);
-    pcb->chip.flash.power_lost(pcb->chip.now() - from_s(8e-6), 1234u + static_cast<std::uint32_t>(cut));
-    pcb->chip.set_supply(3.3);
-    pcb->power_on(6);
-    pcb->run_for(0.03);
-    EXPECT_EQ(pcb->door().restored, 2u) << "cut in word " << cut;
-  }
 }
 
 }  // namespace

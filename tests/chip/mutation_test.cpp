@@ -178,7 +178,7 @@ Options examined() {
 std::unique_ptr<boards::Pcb> mutant(const Mutation& mutation) {
   auto pcb = std::make_unique<boards::Pcb>(design_of(examined()), 1);
   pcb->flash_image(image);
-  firmware::AxisSetup setup[2];
+  firmware::AxisSet setup[2];
   setup_of(examined(), setup);
   pcb->flash_parameters(setup);
   for (int i = 0; i < 2; ++i) pcb->bench.load(i).inertia_kg_m2 = 1e-5;

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <vector>
+
+#include "boards/dual_48v_20a.hpp"
 
 namespace boards {
 namespace {
@@ -45,6 +48,38 @@ constexpr double settling_s = 1e-6;
 // a count (STM32F405 datasheet, ADC characteristics, equation 1).
 constexpr double thermistor_sampling_s = 16e3 * 7e-12 * 9.7;
 
+constexpr int parameter_sector = 5, journal_sector = 7;
+
+/// A debug probe with the chip in reset: writes flash as the firmware's own store does.
+struct Programmer {
+  Chip& chip;
+  int sector;
+  std::vector<std::uint8_t> cells[2] = {bytes(0), bytes(1)};
+
+  std::vector<std::uint8_t> bytes(int which) const {
+    std::vector<std::uint8_t> all(Flash::sector_size(sector + which));
+    for (std::uint32_t at = 0; at < all.size(); at += 4) {
+      const std::uint32_t word = chip.flash.word(Flash::sector_start(sector + which) + at);
+      std::memcpy(all.data() + at, &word, 4);
+    }
+    return all;
+  }
+  std::span<const std::uint8_t> area(int which) const { return cells[which]; }
+  bool program(int which, std::size_t byte, std::span<const std::uint32_t> words) {
+    std::memcpy(cells[which].data() + byte, words.data(), words.size_bytes());
+    chip.flash.load(Flash::sector_start(sector + which) + static_cast<std::uint32_t>(byte), words.data(),
+                    static_cast<std::uint32_t>(words.size_bytes()));
+    return true;
+  }
+  bool erase(int) { return false; }
+};
+
+/// What the last power-down left before a long night.
+firmware::DriverMemory cold_memory() {
+  const thermal::HeatMemory cold{4, {25, 25, 25, 25}, {5, 5, 5, 5}, 25};
+  return {{{cold, {}}, {cold, {}}}, 0.0f};
+}
+
 }  // namespace
 
 host_sim::SensorDesign h8_15d_sensors() {
@@ -62,12 +97,33 @@ Pcb::Pcb(const host_sim::BenchDesign& design, std::uint64_t seed)
   chip.connect(this);
 }
 
-void Pcb::flash_parameters(const firmware::AxisSetup (&axes)[2], std::uint32_t serial) {
-  auto record = std::make_unique<h8_15d::ParameterRecord>();
-  std::memset(static_cast<void*>(record.get()), 0, sizeof *record);
-  for (int i = 0; i < 2; ++i) record->payload.axes[i] = axes[i];
-  record->seal(serial);
-  chip.flash.load(Flash::sector_start(5), record.get(), sizeof *record);
+void Pcb::flash_parameters(const firmware::AxisSet (&axes)[2]) {
+  Programmer programmer{chip, parameter_sector};
+  const firmware::BoardRating rating = boards::dual_48V_20A;
+  firmware::ParameterStore store(rating);
+  (void)store.start(programmer);
+  auto driver = std::make_unique<firmware::Driver>(firmware::DriverSetup{rating, {}, {}});
+  const auto must = [](const wire::Answer& answer) {
+    if (answer.status != 0)
+      throw std::runtime_error(std::string("the parameters are refused: ") + wire::text_of(answer.status).happened);
+  };
+  for (int axis = 0; axis < 2; ++axis) {
+    for (int i = 0; i < firmware::parameter_count; ++i) {
+      must(store.stage({{firmware::parameter_info(i)->id, static_cast<std::uint8_t>(axis)},
+                        firmware::parameter_value(axes[axis], i)}));
+    }
+  }
+  must(store.commit(*driver));
+  driver = std::make_unique<firmware::Driver>(firmware::DriverSetup{rating, {}, {}});  // one that has nothing posted
+  must(store.save(*driver, programmer));
+  flash_journal(cold_memory());
+}
+
+void Pcb::flash_journal(const firmware::DriverMemory& memory) {
+  std::uint32_t record[firmware::header_words + sizeof memory / 4] = {};
+  std::memcpy(record + firmware::header_words, &memory, sizeof memory);
+  firmware::seal(record, 0x41454848, 1);
+  chip.flash.load(Flash::sector_start(journal_sector), record, sizeof record);
 }
 
 void Pcb::power_on(std::uint32_t seed, bool keep_backup) {
@@ -252,6 +308,18 @@ void Pcb::wish(int axis, h8_15d::DoorWish what) {
   ++d.wish_serial;
   std::memcpy(at + offsetof(h8_15d::Door, wish_serial), static_cast<const void*>(&d.wish_serial),
               3 * sizeof(std::uint32_t));
+}
+
+wire::Answer Pcb::order(h8_15d::DoorOrder what, const wire::Assignment& assignment) {
+  auto* at = chip.core().ram() + (door_address() - Core::ram_base);
+  h8_15d::Door d = door();
+  d.order = what;
+  d.assignment = assignment;
+  ++d.order_serial;
+  std::memcpy(at + offsetof(h8_15d::Door, order_serial), static_cast<const void*>(&d.order_serial),
+              offsetof(h8_15d::Door, answer) - offsetof(h8_15d::Door, order_serial));
+  run_for(0.02);
+  return door().order_answer;
 }
 
 bool Pcb::arm(double patience_s) {

@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "boards/h8-15d/door.hpp"
-#include "boards/h8-15d/store.hpp"
+#include "firmware/parameter_store.hpp"
 #include "host-sim/chip/chip.hpp"
 #include "host-sim/plant/bench.hpp"
 
@@ -22,9 +22,11 @@ class Pcb final : public host_sim::chip::Board {
  public:
   Pcb(const host_sim::BenchDesign& design, std::uint64_t seed);
 
-  /// As a programmer would: image, then a parameter record into the first parameter sector.
+  /// As a programmer would: the image; and what a life before this one left: saved parameters, a journal that says
+  /// cold.
   void flash_image(const std::string& elf) { chip.load(elf); }
-  void flash_parameters(const firmware::AxisSetup (&axes)[2], std::uint32_t serial = 1);
+  void flash_parameters(const firmware::AxisSet (&axes)[2]);
+  void flash_journal(const firmware::DriverMemory& memory);
   void power_on(std::uint32_t seed = 1, bool keep_backup = false);
   void run_for(double seconds);
 
@@ -32,6 +34,8 @@ class Pcb final : public host_sim::chip::Board {
   h8_15d::Door door() const;
   void set_current(int axis, float id_A, float iq_A);
   void wish(int axis, h8_15d::DoorWish what);
+  /// An order about the parameters, and the image's answer to it.
+  wire::Answer order(h8_15d::DoorOrder what, const wire::Assignment& assignment = {});
   /// Arms both axes as a person would: waits until the offsets are known. False: refused.
   bool arm(double patience_s = 0.5);
 

@@ -10,7 +10,6 @@
 
 #include "boards/h8-15d/board.hpp"
 #include "boards/host/chip/pcb.hpp"
-#include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -54,15 +53,13 @@ std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, 
 
   auto pcb = std::make_unique<Pcb>(design, scene.seed);
   pcb->flash_image(elf);
-  firmware::AxisSetup setup[2];
-  for (firmware::AxisSetup& s : setup) {
-    s.parameters = firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f});
-    s.heat = thermal::three_phase_set(known);
-    s.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
-                        : scene.trust == "identified" ? thermal::identified_trust
-                                                      : thermal::exact_trust;
-  }
-  pcb->flash_parameters(setup);
+  const thermal::Trust& trust = scene.trust == "sheet"        ? thermal::sheet_trust
+                                : scene.trust == "identified" ? thermal::identified_trust
+                                                              : thermal::exact_trust;
+  const firmware::AxisSet set{
+      firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f}),
+      firmware::heat_parameters_from(known, trust)};
+  pcb->flash_parameters({set, set});
   for (int axis = 0; axis < 2; ++axis) {
     host_sim::Load& load = pcb->bench.load(axis);
     if (scene.shaft.kind == host::Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
