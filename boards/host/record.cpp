@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "boards/host/run_scene.hpp"
@@ -38,7 +39,8 @@ bool shows_on_a_bench(const std::string& id) {
 /// The scene that is recorded, without its program: a named one, or an empty one for a made excitation.
 Scene scene_of(const RecordOptions& options) {
   Scene scene;
-  if (options.excitation == "duty" || options.excitation == "designed" || options.excitation == "step") {
+  if (options.excitation == "duty" || options.excitation == "designed" || options.excitation == "step" ||
+      options.excitation == "profile") {
     scene.motor = options.motor;
     return scene;
   }
@@ -46,10 +48,43 @@ Scene scene_of(const RecordOptions& options) {
   if (scene.shaft.kind == Shaft::Kind::free) {
     throw wire::pc::UserError(
         wire::pc::Exit::usage,
-        "A scene with a free shaft cannot be repeated; record duty, designed, step, or a scene with "
+        "A scene with a free shaft cannot be repeated; record duty, designed, step, profile, or a scene with "
         "an imposed speed or a locked rotor.");
   }
   return scene;
+}
+
+/// The experiment that identify advises, from its answer. Currents are direct ones, as in the log.
+std::vector<host_sim::Demand> advised(const std::string& path) {
+  using wire::pc::Exit, wire::pc::UserError;
+  std::ifstream in(path);
+  if (!in)
+    throw UserError(Exit::usage, fmt::format("--profile {}: there is no such file; identify --json writes one.", path));
+  const nlohmann::json answer = nlohmann::json::parse(in, nullptr, false);
+  const bool advice = answer.is_object() && answer.contains("experiment") && answer["experiment"].is_object() &&
+                      answer["experiment"].contains("profile") && answer["experiment"]["profile"].is_array();
+  if (!advice) {
+    throw UserError(Exit::usage,
+                    fmt::format("--profile {}: no experiment in it; identify advises one where causes tie.", path));
+  }
+  std::vector<host_sim::Demand> demands;
+  for (const nlohmann::json& step : answer["experiment"]["profile"]) {
+    const auto number = [&](const char* key) {
+      const bool there = step.is_object() && step.contains(key) && step[key].is_number();
+      if (!there) throw UserError(Exit::usage, fmt::format("--profile {}: a step without the number '{}'.", path, key));
+      return step[key].get<double>();
+    };
+    host_sim::Demand demand;
+    demand.current_A = number("current_A") * 2 / std::sqrt(3.0);
+    demand.speed_rad_per_s = number("speed_rad_per_s");
+    const double seconds = number("seconds");
+    if (!(seconds >= 0 && seconds <= 86400))
+      throw UserError(Exit::usage,
+                      fmt::format("--profile {}: a step of {:g} s; 0 to 86400 are possible.", path, seconds));
+    demands.insert(demands.end(), static_cast<std::size_t>(seconds * program_Hz), demand);
+  }
+  if (demands.empty()) throw UserError(Exit::usage, fmt::format("--profile {}: the experiment has no step.", path));
+  return demands;
 }
 
 std::vector<host_sim::Demand> excitation_of(const RecordOptions& options, const Scene& scene,
@@ -62,6 +97,7 @@ std::vector<host_sim::Demand> excitation_of(const RecordOptions& options, const 
     if (options.excitation == name)
       return host_sim::make_excitation(kind, sheet, full_speed, length_s, program_Hz, options.seed);
   }
+  if (options.excitation == "profile") return advised(options.profile);
   // A scene, again and again.
   std::vector<host_sim::Demand> demands(static_cast<std::size_t>(length_s * program_Hz));
   for (std::size_t i = 0; i < demands.size(); ++i) {
@@ -84,7 +120,10 @@ std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Sce
 HiddenMotor hidden_motor(const RecordOptions& options) {
   const Scene scene = scene_of(options);
   const wire::Motor sheet = wire::pc::read_motor(scene.motor, options.motor_folder).motor;
-  const std::vector<host_sim::Demand> demands = demands_of(options, scene, sheet);
+  // The same motor whatever is played on it afterwards: a profile does not size the effect, the duty does.
+  RecordOptions sized_on = options;
+  if (options.excitation == "profile") sized_on.excitation = "duty";
+  const std::vector<host_sim::Demand> demands = demands_of(sized_on, scene, sheet);
   host_sim::Random random(*options.hide);
   const auto factor = [&] { return std::exp(random.uniform(std::log(least_factor), std::log(largest_factor))); };
   HiddenMotor truth{sheet, {}, {}};

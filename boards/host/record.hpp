@@ -14,7 +14,8 @@
 namespace boards::host {
 
 struct RecordOptions {
-  std::string excitation = "duty";  // duty, designed or step; or a scene
+  std::string excitation = "duty";  // duty, designed, step or profile; or a scene
+  std::string profile = {};         // of the excitation "profile": the answer of identify (JSON) with its experiment
   std::string motor = "ec-16-40w";
   double minutes = 20;
   std::uint64_t seed = 1;                  // of excitation and sensor noise

@@ -26,7 +26,7 @@ struct Row {
   double estimated_core_degC;  // hottest phase winding, as the firmware believes
   double core_sigma_K;
   double true_core_degC;     // hottest phase winding of the simulated motor
-  double true_winding_degC;  // mean of the three
+  double true_winding_degC;  // mean of all copper, as its resistance tells
   double housing_degC;       // as the sensor reads
   double true_housing_degC;
   double ambient_degC;

@@ -270,7 +270,7 @@ AxisTruth Bench::truth(int index) const {
   truth.phase_degC = {axis.stove.degC(Place::phase_a), axis.stove.degC(Place::phase_b),
                       axis.stove.degC(Place::phase_c)};
   truth.hottest_degC = axis.stove.hottest_degC();
-  truth.winding_degC = axis.stove.winding_degC();
+  truth.winding_degC = axis.stove.copper_degC();
   truth.teeth_degC = axis.stove.degC(Place::teeth);
   truth.housing_degC = axis.stove.degC(Place::housing);
   truth.frame_degC = axis.stove.degC(Place::frame);

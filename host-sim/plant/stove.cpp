@@ -46,6 +46,11 @@ double Stove::hottest_degC() const {
   return hot_spot_W_per_K_ > 0 ? std::max(windings_degC, T_degC_[hot_spot]) : windings_degC;
 }
 
+double Stove::copper_degC() const {
+  const double share = hot_spot_W_per_K_ > 0 ? hidden_.hot_spot_share : 0;
+  return (1 - share) * winding_degC() + share * T_degC_[hot_spot];
+}
+
 double Stove::magnet_degC() const { return d_.rotor_J_per_K > 0 ? T_degC_[rotor] : T_degC_[teeth]; }
 
 double Stove::phase_ohm(int phase, double speed_rad_per_s) const {

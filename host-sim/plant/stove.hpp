@@ -50,6 +50,8 @@ class Stove {
 
   double degC(Place place) const { return T_degC_[static_cast<int>(place)]; }
   double winding_degC() const { return (T_degC_[0] + T_degC_[1] + T_degC_[2]) / 3; }
+  /// Of all copper, a hot spot's share included: what the winding's resistance tells.
+  double copper_degC() const;
   double hottest_degC() const;  // of the windings and a hot spot
   double magnet_degC() const;
   /// Resistance of a phase at present, alternating-current factor included.

@@ -305,16 +305,16 @@ int score(const Arguments& a) {
       }
       progress(row->key);
     }
+    const std::size_t before = table.size();
     for (const Bound& b : row->bounds) {
       table.add(row->key, b.what, static_cast<int>(std::count_if(results.begin(), results.end(), b.hit)),
                 static_cast<int>(results.size()), b.at_least, b.promised, b.floor);
     }
     add_measures(*row, results, table);
-    if (!a.json && !a.quick) {
-      fmt::print("{}: not right\n", row->title);
-      print_confusions(results);
-      std::fflush(stdout);
-    }
+    if (a.json) continue;
+    fmt::print("{}", table.text(before));
+    if (!a.quick) print_confusions(results);
+    std::fflush(stdout);
   }
   std::filesystem::remove(path);
   if (a.json)
@@ -322,7 +322,7 @@ int score(const Arguments& a) {
         "{}\n",
         nlohmann::ordered_json{{"first_seed", a.first}, {"structure", a.structure}, {"figures", table.json()}}.dump(2));
   else
-    fmt::print("{}{} logs, first seed {}, structure {:g}, {:.2f} s a search\n", table.text(), all, a.first, a.structure,
+    fmt::print("{} logs, first seed {}, structure {:g}, {:.2f} s a search\n", all, a.first, a.structure,
                search_s / static_cast<double>(std::max<std::size_t>(all, 1)));
   return a.check && !table.holds() ? 1 : 0;
 }

@@ -43,9 +43,12 @@ class Table {
   bool holds() const {
     return std::all_of(figures_.begin(), figures_.end(), [](const Figure& f) { return f.holds(); });
   }
-  std::string text() const {
+  std::size_t size() const { return figures_.size(); }
+  /// Figures from the from-th on.
+  std::string text(std::size_t from = 0) const {
     std::string out = fmt::format("{:<18} {:<34} {:>7} {:>12} {:>9}\n", "row", "figure", "value", "of", "promised");
-    for (const Figure& f : figures_) {
+    for (std::size_t i = from; i < figures_.size(); ++i) {
+      const Figure& f = figures_[i];
       out += fmt::format("{:<18} {:<34} {:>7.3f} {:>12} {:>2} {:<6g} {}{}\n", f.row, f.what, f.value,
                          f.hits < 0 ? fmt::format("{} logs", f.trials) : fmt::format("{}/{}", f.hits, f.trials),
                          f.at_least ? ">=" : "<=", f.promised,
