@@ -137,6 +137,7 @@ class UsbBus {
       e->stalled = e->ready = false;
       e->toggle = true;
     }
+    port_.next_address_ = port_.address_;  // a SET_ADDRESS that was broken off never happened
     device_.setup(raw);
     return Handshake::ack;
   }
