@@ -47,10 +47,13 @@ void Application::prepare(std::uint32_t reset_flags, bool clock_good) {
   door = {};
   door.reset_flags = reset_flags;
   for (std::uint32_t i = 0; i < 3; ++i) door.unique_id[i] = reg(unique_id + 4 * i);
+  for (std::uint32_t i = 0; i < 24; ++i)
+    serial_[i] = "0123456789ABCDEF"[door.unique_id[i / 8] >> (28 - 4 * (i % 8)) & 0xF];
   door.parameters = found_;
   door.saved_serial = parameters_.saved_serial();
   good_ = clock_good_ = clock_good;
   remember();
+  if (clock_good_) usb_port_.set_up();
   if (!good_) return;
   stage_.set_up();
   for (int i = 0; i < 2; ++i) find_rotor(i);
@@ -100,10 +103,12 @@ void Application::find_rotor(int axis) {
 void Application::control() {
   const int axis = stage_.take();
   if (axis < 0) return;
-  stage_.drive(axis, driver_.axis(axis).tick(stage_.sample(axis)));
+  const hal::AxisSample sample = stage_.sample(axis);
+  stage_.drive(axis, driver_.axis(axis).tick(sample));
   const std::uint32_t mine = fast_ticks_[axis].load(std::memory_order_relaxed) + 1;
   fast_ticks_[axis].store(mine, std::memory_order_relaxed);
   if (axis == 1) {
+    recorder_.tick(sample.sequence);
     const std::uint32_t other = fast_ticks_[0].load(std::memory_order_relaxed);
     if (other != fast_fed_) feed_wwdg();
     fast_fed_ = other;
@@ -153,6 +158,11 @@ void Application::run() {
 void Application::every_ms(std::uint32_t ms) {
   read_slow_channel();
   look_at_door();
+  link_.work(parameter_flash_);
+  if (!usb_connected_ && clock_good_ && ms >= usb_connect_ms) {
+    usb_connected_ = true;
+    usb_port_.connect(true);
+  }
   if (ms - slow_ms_ >= 10) {
     slow_ms_ = ms;
     slow_lane();

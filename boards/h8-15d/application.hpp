@@ -3,8 +3,10 @@
 //
 //   ADC interrupt   20 kHz per axis, alternating   fast lane: sample -> Driver -> duty; feeds the window watchdog
 //   EXTI            index pulse                    rotor zero
+//   OTG_FS          a packet, or a ms of the bus   requests, setpoints, telemetry: below the fast lane, above the slow
 //   EXTI 16         supply falls                   gates off, last heat into the journal
-//   main loop       every 1 ms (SysTick wakes it)  slow conversions, door; every 10 ms the slow lane; feeds the IWDG
+//   main loop       every 1 ms (SysTick wakes it)  slow conversions, door, errands of USB; every 10 ms the slow lane;
+//   feeds the IWDG
 //
 // The IWDG is fed only when both fast lanes and the slow lane have moved on, the WWDG only from the fast lane of axis 1
 // when axis 0 has run since: a hang of either lane resets the chip, and reset opens the gates.
@@ -17,7 +19,12 @@
 #include "boards/h8-15d/heat_keeper.hpp"
 #include "boards/h8-15d/power_stage.hpp"
 #include "boards/h8-15d/store.hpp"
+#include "boards/h8-15d/usb_controller.hpp"
+#include "firmware/link/link.hpp"
+#include "firmware/link/text_port.hpp"
 #include "firmware/parameter_store.hpp"
+#include "firmware/usb/device.hpp"
+#include "firmware/version.hpp"
 
 namespace h8_15d {
 
@@ -30,6 +37,7 @@ class Application {
 
   void control();                                                         // ADC interrupt
   void index(int axis);                                                   // EXTI
+  void usb() { usb_port_.serve(usb_); }                                   // OTG_FS
   void supply_falls();                                                    // PVD
   void tick() { milliseconds_.fetch_add(1, std::memory_order_relaxed); }  // SysTick
 
@@ -47,6 +55,14 @@ class Application {
   wire::Answer found_;  // what the saved parameters were worth
   firmware::Driver driver_;
   HeatKeeper keeper_;
+  firmware::Recorder recorder_;
+  char serial_[25]{};  // the chip's unique id: 24 digits
+  firmware::usb::Identity identity_{"h8-15d", firmware::version, serial_};
+  firmware::Link link_{driver_, recorder_, parameters_, identity_, rating};
+  firmware::TextPort text_{link_.commands()};
+  UsbController usb_port_;
+  firmware::usb::Device<UsbController, firmware::Link, firmware::TextPort> usb_{usb_port_, identity_, link_, text_};
+  bool usb_connected_ = false;
   PowerStage stage_;
   std::atomic<std::uint32_t> milliseconds_{0};
   std::atomic<std::uint32_t> fast_ticks_[2]{};

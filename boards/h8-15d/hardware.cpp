@@ -96,9 +96,7 @@ void bring_up_encoders() {
 }
 
 void bring_up_usb_pins() {
-  set(rcc::ahb2enr, bit(7));     // OTGFSEN
-  reg(otg_fs::gccfg) = bit(21);  // NOVBUSSENS: PA9 belongs to TIM1; the transceiver stays off
-  set(otg_fs::dctl, bit(1));     // SDIS: not seen on the cable until there is a device stack
+  set(rcc::ahb2enr, bit(7));  // OTGFSEN
   shape(usb_dm, alternate, none, 10, 2);
   shape(usb_dp, alternate, none, 10, 2);
 }
@@ -111,7 +109,7 @@ void bring_up_cycle_counter() {
 
 void bring_up_interrupts(std::uint32_t core_Hz) {
   reg(system::aircr) = 0x05FA0300;  // PRIGROUP 3: all four bits preempt
-  for (const Priority p : {pvd_irq, index0_irq, index1_irq, adc_irq}) {
+  for (const Priority p : {pvd_irq, index0_irq, index1_irq, adc_irq, usb_irq}) {
     byte_reg(system::nvic_ipr + static_cast<std::uint32_t>(p.irq)) = static_cast<std::uint8_t>(p.level << 4);
     reg(system::nvic_iser + 4 * static_cast<std::uint32_t>(p.irq / 32)) = bit(p.irq % 32);
   }

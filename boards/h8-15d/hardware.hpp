@@ -19,7 +19,7 @@ void bring_up_pins();
 void bring_up_supply_watch();  // PVD at 2.9 V to EXTI16
 void bring_up_backup_ram();
 void bring_up_encoders();
-void bring_up_usb_pins();
+void bring_up_usb_pins();  // and the clock of OTG_FS
 void bring_up_cycle_counter();
 void bring_up_interrupts(std::uint32_t core_Hz);
 void start_watchdogs(bool fast_lane);  // the window watchdog watches the fast lane, if there is one

@@ -17,6 +17,7 @@ void pvd_handler();
 void index0_handler();
 void index1_handler();
 void adc_handler();
+void usb_handler();
 void systick_handler();
 [[noreturn]] void unexpected_handler();
 }
@@ -54,10 +55,7 @@ extern "C" {
   wait_for_supply();
   bring_up_backup_ram();
   bring_up_cycle_counter();
-  if (clock_good) {
-    bring_up_encoders();
-    bring_up_usb_pins();
-  }
+  if (clock_good) bring_up_encoders();
   application = new (application_storage) Application();
   application->prepare(reset_flags, clock_good);
   application->run();
@@ -99,6 +97,7 @@ void index1_handler() {
 }
 
 void adc_handler() { application->control(); }
+void usb_handler() { application->usb(); }
 void systick_handler() { application->tick(); }
 
 // RM0090 12.2, Table 61.
@@ -193,7 +192,7 @@ extern const VectorTable vectors;
                                                                          U,
                                                                          U,
                                                                          U,
-                                                                         U,
+                                                                         usb_handler,  // 67 OTG_FS
                                                                          U,
                                                                          U,
                                                                          U,

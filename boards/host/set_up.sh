@@ -2,6 +2,7 @@
 
 packages_host=(g++ cmake ninja-build libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev
                libgtest-dev gnuplot-nox libunicorn-dev pkg-config libusb-1.0-0-dev libedit-dev umockdev libumockdev-dev)
+packages_guest=(qemu-system-x86 busybox-static)
 packages_qemu_m4f=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 
 say() { printf '\033[1m%s\033[0m\n' "$*" >&2; }
@@ -29,4 +30,15 @@ set_up() {
   [[ "$preset" == qemu-m4f || "$preset" == h8-15d ]] && install_missing "${packages_qemu_m4f[@]}"
   say "Building: $preset"
   (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" ${2:+--target "$2"} >&2)
+}
+
+# set_up_guest: a Linux kernel of Debian's, unpacked (not installed) into build/guest/kernel, for the test of the whole USB chain.
+set_up_guest() {
+  install_missing "${packages_guest[@]}"
+  local guest=$here/build/guest package
+  [ -d "$guest/kernel/boot" ] && return 0
+  package=$(apt-cache depends linux-image-amd64 | awk '/Depends: linux-image/ { print $2; exit }')
+  say "Fetching: $package"
+  mkdir -p "$guest"
+  (cd "$guest" && apt-get download -qq -o APT::Sandbox::User=root "$package" && dpkg -x "$package"_*.deb unpacked && rm "$package"_*.deb && mv unpacked kernel)
 }
