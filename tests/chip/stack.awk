@@ -25,8 +25,8 @@ function deepest(f,   parts, n, i, d, most) {
   return done[f]
 }
 END {
-  # Levels of boards/h8-15d/board.hpp: main, SysTick 14, ADC 2, index 1, PVD 0, then NMI or a fault.
-  n = split("reset_handler systick_handler adc_handler index0_handler pvd_handler nmi_handler", entry, " ")
+  # Levels of boards/h8-15d/board.hpp: main, SysTick 14, USB 8, ADC 2, index 1, PVD 0, then NMI or a fault.
+  n = split("reset_handler systick_handler usb_handler adc_handler index0_handler pvd_handler nmi_handler", entry, " ")
   for (i = 1; i <= n; ++i) {
     if (!(entry[i] in own)) { print "no such function: " entry[i]; bad = 1 }
     d = deepest(entry[i]); total += d + (i > 1 ? frame : 0)
