@@ -15,6 +15,7 @@ command -v qemu-system-x86_64 >/dev/null || missing "no qemu-system-x86_64 (set_
 command -v busybox >/dev/null || missing "no busybox"
 vmlinuz=$(ls "$kernel"/boot/vmlinuz-* 2>/dev/null | head -1) || true
 [ -n "$vmlinuz" ] || missing "no kernel in $kernel (set_up_guest in boards/host/set_up.sh)"
+[ -x "$programs/hotcore" ] || missing "no program hotcore"
 [ -f "$image" ] || missing "no flash image $image (cmake --preset h8-15d && cmake --build --preset h8-15d)"
 
 work=$(mktemp -d)
@@ -27,10 +28,8 @@ cp "$(command -v busybox)" "$programs/attach" "$root/bin/"
 for m in e1000 usb-common usbcore usbip-core vhci-hcd cdc-acm; do
   cp "$(find "$kernel/lib/modules" -name "$m.ko")" "$root/modules/"
 done
-if [ -x "$programs/hotcore" ]; then  # with the libraries it is linked to
-  cp "$programs/hotcore" "$root/bin/"
-  ldd "$programs/hotcore" | grep -o '/[^ ]*' | while read -r library; do cp --parents "$library" "$root/"; done
-fi
+cp "$programs/hotcore" "$root/bin/"  # and the libraries it is linked to
+ldd "$programs/hotcore" | grep -o '/[^ ]*' | while read -r library; do cp --parents "$library" "$root/"; done
 (cd "$root" && find . | busybox cpio -o -H newc 2>/dev/null | gzip -1) >"$work/initrd"
 
 "$programs/virtual-chip" --port 0 --image "$image" >"$work/server" 2>"$work/mistakes" &
@@ -42,7 +41,6 @@ for _ in $(seq 100); do
   sleep 0.1
 done
 [ -n "$port" ] || { cat "$work/mistakes"; exit 1; }
-
 
 timeout 100 qemu-system-x86_64 -accel tcg -m 256 -nographic -no-reboot -nodefaults -serial stdio \
   -kernel "$vmlinuz" -initrd "$work/initrd" -append "console=ttyS0 quiet panic=-1 mitigations=off hotcore_port=$port" \
