@@ -119,6 +119,13 @@ void Pcb::flash_parameters(const firmware::AxisSet (&axes)[2]) {
   flash_journal(cold_memory());
 }
 
+firmware::ParameterSet Pcb::saved_parameters() {
+  Programmer programmer{chip, parameter_sector};
+  firmware::ParameterStore store(boards::dual_48V_20A);
+  if (store.start(programmer).status != 0) throw std::runtime_error("no whole parameter set is saved");
+  return store.in_force();
+}
+
 void Pcb::flash_journal(const firmware::DriverMemory& memory) {
   std::uint32_t record[firmware::header_words + sizeof memory / 4] = {};
   std::memcpy(record + firmware::header_words, &memory, sizeof memory);
@@ -310,7 +317,7 @@ void Pcb::wish(int axis, h8_15d::DoorWish what) {
               3 * sizeof(std::uint32_t));
 }
 
-wire::Answer Pcb::order(h8_15d::DoorOrder what, const wire::Assignment& assignment) {
+void Pcb::post(h8_15d::DoorOrder what, const wire::Assignment& assignment) {
   auto* at = chip.core().ram() + (door_address() - Core::ram_base);
   h8_15d::Door d = door();
   d.order = what;
@@ -318,6 +325,10 @@ wire::Answer Pcb::order(h8_15d::DoorOrder what, const wire::Assignment& assignme
   ++d.order_serial;
   std::memcpy(at + offsetof(h8_15d::Door, order_serial), static_cast<const void*>(&d.order_serial),
               offsetof(h8_15d::Door, answer) - offsetof(h8_15d::Door, order_serial));
+}
+
+wire::Answer Pcb::order(h8_15d::DoorOrder what, const wire::Assignment& assignment) {
+  post(what, assignment);
   run_for(0.02);
   return door().order_answer;
 }

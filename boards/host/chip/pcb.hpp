@@ -26,6 +26,8 @@ class Pcb final : public host_sim::chip::Board {
   /// cold.
   void flash_image(const std::string& elf) { chip.load(elf); }
   void flash_parameters(const firmware::AxisSet (&axes)[2]);
+  /// What its parameter sectors hold; throws if that is nothing whole.
+  firmware::ParameterSet saved_parameters();
   void flash_journal(const firmware::DriverMemory& memory);
   void power_on(std::uint32_t seed = 1, bool keep_backup = false);
   void run_for(double seconds);
@@ -34,6 +36,7 @@ class Pcb final : public host_sim::chip::Board {
   h8_15d::Door door() const;
   void set_current(int axis, float id_A, float iq_A);
   void wish(int axis, h8_15d::DoorWish what);
+  void post(h8_15d::DoorOrder what, const wire::Assignment& assignment = {});
   /// An order about the parameters, and the image's answer to it.
   wire::Answer order(h8_15d::DoorOrder what, const wire::Assignment& assignment = {});
   /// Arms both axes as a person would: waits until the offsets are known. False: refused.
