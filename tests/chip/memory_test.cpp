@@ -80,7 +80,7 @@ TEST(Memory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
     for (int i = 0; i < 400 && pcb->chip.resets() == 0; ++i) push(*pcb, 0.002);
     ASSERT_EQ(pcb->chip.resets(), 1);
     pcb->chip.core().unhang();
-    pcb->run_for(0.015);
+    pcb->run_for(0.025);
     EXPECT_EQ(pcb->door().restored, 1u);
     EXPECT_GT(estimated_degC(*pcb), before - 2.0);
     ASSERT_TRUE(pcb->arm());
