@@ -13,7 +13,10 @@ namespace console {
 std::string full_name(const Description& what) {
   if (what.unit.empty() || what.unit == "count") return what.name;
   std::string unit = what.unit;
-  if (const std::size_t slash = unit.find('/'); slash != std::string::npos) unit.replace(slash, 1, "_per_");
+  if (unit.rfind("1/", 0) == 0)
+    unit.replace(0, 2, "per_");
+  else if (const std::size_t slash = unit.find('/'); slash != std::string::npos)
+    unit.replace(slash, 1, "_per_");
   return what.name + "_" + unit;
 }
 

@@ -41,7 +41,7 @@ std::string fault_sentence(const wire::FaultEvidence& evidence) {
   return sentence;
 }
 
-Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
              const std::function<void(const wire::State&, double)>& look) {
   const int first = (mask & 1) != 0 ? 0 : 1;
   Driven driven;
@@ -52,7 +52,8 @@ Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& prof
     end_s += double{piece.seconds};
     while (session.now_s() < end_s) {
       stop_if_interrupted("Stopped and disarmed.");
-      const wire::State state = session.exchange({mask, {}, {0, 0}, {piece.current_A, piece.current_A}});
+      const float d_A = along == Along::d ? piece.current_A : 0, q_A = along == Along::q ? piece.current_A : 0;
+      const wire::State state = session.exchange({mask, {}, {d_A, d_A}, {q_A, q_A}});
       const double now_s = session.now_s();
       for (int a = 0; a < wire::axis_count; ++a) {
         if ((mask >> a & 1) == 0) continue;

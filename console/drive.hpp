@@ -33,9 +33,12 @@ struct Driven {
   std::uint8_t limit = 0;  // what held it back most recently
 };
 
-/// Plays a course of iq on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError:
+/// Where the current goes: iq turns the shaft, id only heats the winding and holds the rotor where it is.
+enum class Along { q, d };
+
+/// Plays a course of current on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError:
 /// refused when an axis trips or refuses a setpoint, interrupted after Ctrl-C, gone. The caller holds an Armed.
-Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
              const std::function<void(const wire::State&, double)>& look);
 
 /// The sentence of a fault: what happened, evidence, advice. Empty for none.

@@ -1,6 +1,173 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
 #include "console/commands.hpp"
+#include "console/drive.hpp"
+#include "console/heat_experiment.hpp"
+#include "console/parameter_file.hpp"
+#include "console/recorder.hpp"
+#include "wire/pc/files.hpp"
 
 namespace console {
-void add_identify(CLI::App&, Console&) {}
+namespace {
+
+/// The program identify: beside this one, or wherever the shell finds it.
+std::string identify_program() {
+  std::error_code error;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto beside = self.parent_path() / "identify";
+  return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : "identify";
+}
+
+/// Runs it without a shell. Throws UserError (unusable) when it could not answer; it has said why.
+void run_identify(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), identify_program());
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    execvp(argv[0], argv.data());
+    _exit(127);
+  }
+  int status = 0;
+  while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  const int code = child > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 127;
+  if (code == 127)
+    throw UserError(Exit::unusable, "The program identify was not found; build it or put it beside hotcore.");
+  if (code != 0)
+    throw UserError(Exit::unusable, "identify could not use the log; its sentence stands above, the log is kept.");
+}
+
+Values values_of(Session& session, int axis) {
+  std::vector<Target> mine;
+  for (const Target& target : session.parameters().all()) {
+    if (target.axis == axis) mine.push_back(target);
+  }
+  const std::vector<float> numbers = session.get(mine);
+  Values values;
+  for (std::size_t i = 0; i < mine.size(); ++i) values[full_name(*mine[i].what)] = numbers[i];
+  return values;
+}
+
+struct Arguments {
+  std::string axis = "0", out = "out/identify";
+  double minutes = 20;
+  bool yes = false, save = false;
+};
+
+/// Drives the designed course and logs it.
+Driven record(Console& console, int axis, const std::vector<Piece>& course, const std::string& log) {
+  Session& session = console.session();
+  const auto mask = static_cast<std::uint8_t>(1 << axis);
+  Recorder recorder(session, log, fmt::format("axis {}, designed course for identification", axis),
+                    usual_signals(session.signals(), axis), 10);
+  double length_s = 0, told_s = -1e9;
+  for (const Piece& piece : course) length_s += double{piece.seconds};
+  Driven driven;
+  {
+    Armed armed(session, mask);
+    driven = drive(session, mask, course, Along::d, [&](const wire::State& state, double time_s) {
+      if (time_s - told_s < length_s / 10) return;
+      told_s = time_s;
+      console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed", 100 * time_s / length_s,
+                               state.axis[axis].core_degC, std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
+                               state.axis[axis].allowance_A));
+    });
+  }
+  recorder.finish();
+  return driven;
+}
+
+bool agreed(Console& console, const Arguments& a) {
+  if (a.yes) return true;
+  if (console.options.json || isatty(STDIN_FILENO) == 0) return false;
+  fmt::print("Put these in force? [y/N] ");
+  std::fflush(stdout);
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "yes";
+}
+
+void identify(Console& console, const Arguments& a) {
+  Session& session = console.session();
+  const int axis = a.axis == "1" ? 1 : 0;
+  const Values before = values_of(session, axis);
+  const double rated_A = continuous_A(before);
+  const std::string log = a.out + "/log.csv", sheet = a.out + "/motor.toml", json = a.out + "/answer.json",
+                    model = a.out + "/model.toml";
+  wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
+
+  console.tell(
+      fmt::format("Heating axis {} for {:g} min with up to {:.1f} A along the magnet: the rotor turns to one place and "
+                  "stays there. Ctrl-C disarms.",
+                  axis, a.minutes, 2.5 * rated_A));
+  const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
+  console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
+  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"});
+
+  std::ifstream in(json);
+  const auto answer = nlohmann::json::parse(in, nullptr, false);
+  const std::string sentence = answer.is_object() ? answer.value("sentence", std::string()) : "";
+  std::string why;
+  Values found = parameters_of_model(model, why);
+  std::string text = sentence + "\n";
+  Json changes = Json::object();
+  std::vector<Assignment> assignments;
+  for (const auto& [name, value] : found) {
+    const auto old = before.find(name);
+    if (old == before.end() || old->second == value) continue;
+    const Target target = session.parameters().named(fmt::format("axis{}.{}", axis, name)).front();
+    assignments.push_back({target, value});
+    text += fmt::format("  {:<32} {:>11} -> {}\n", full_name(target), shown(old->second), shown(value));
+    changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
+  }
+  Json result = {{"sentence", sentence}, {"verdict", answer.value("verdict", std::string())},
+                 {"changes", changes},   {"log", log},
+                 {"model", model},       {"report", a.out + "/report.html"},
+                 {"written", false},     {"saved", false}};
+  text += fmt::format("Log, model and report: {}\n", a.out);
+  if (found.empty()) {
+    text += fmt::format("Nothing was written: the model has {}, which this board's parameters cannot express.\n", why);
+    return console.say(text, result);
+  }
+  for (const Assignment& assignment : assignments) check(assignment, "identify found ");
+  if (!console.options.json) fmt::print("{}", text);
+  if (!assignments.empty() && agreed(console, a)) {
+    session.set(assignments);
+    if (a.save) session.save();
+    result["written"] = true;
+    result["saved"] = a.save;
+    text = a.save ? "In force and saved.\n" : "In force until the next reset; 'hotcore save' keeps it.\n";
+  } else {
+    text = "Nothing was written; --yes writes without asking.\n";
+  }
+  console.say(text, result);
+}
+
+}  // namespace
+
+void add_identify(CLI::App& app, Console& console) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("identify", "heat an axis under protection, find its thermal model, write it back");
+  command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
+  command->add_option("--minutes", a->minutes, "length of the course")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 240.0));
+  command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
+  command->add_flag("--yes", a->yes, "write what was found without asking");
+  command->add_flag("--save", a->save, "and keep it over a reset");
+  command->callback([&console, a] { identify(console, *a); });
+}
+
 }  // namespace console

@@ -49,9 +49,12 @@ Json json_of(const wire::State& state, double time_s) {
 
 Live::Live(std::uint8_t mask) : mask_(mask), terminal_(on_terminal()), trails_(wire::axis_count) {}
 
-std::string Live::table(const wire::State& state) const {
-  std::string text = fmt::format("{:<5}{:<9}{:>9}{:>9}{:>11}{:>16}{:>10}{:>12}   {}\n", "axis", "mode", "id A", "iq A",
-                                 "rad/s", "core degC", "housing", "allowance A", "limit");
+std::string Live::table(const wire::State& state, double time_s) const {
+  std::string text;
+  if (terminal_ || lines_ == 0) {
+    text = fmt::format("{:>8} {:>7}  {:<5}{:<8}{:>8}{:>8}{:>9}{:>14}{:>9}{:>11}   {}\n", "time s", "bus V", "axis",
+                       "mode", "id A", "iq A", "rad/s", "core degC", "housing", "allowed A", "limit");
+  }
   for (int a = 0; a < wire::axis_count; ++a) {
     if ((mask_ >> a & 1) == 0) continue;
     const wire::AxisReport& axis = state.axis[a];
@@ -59,8 +62,9 @@ std::string Live::table(const wire::State& state) const {
     const char* holding = axis.fault != 0   ? wire::text_of(axis.fault).name
                           : axis.limit != 0 ? wire::text_of(axis.limit).name
                                             : "";
-    text += fmt::format("{:<5}{:<9}{:>9.2f}{:>9.2f}{:>11.1f}{:>16}{:>10.1f}{:>12.2f}   {}\n", a, mode_text(axis.mode),
-                        axis.id_A, axis.iq_A, axis.speed_rad_per_s, core, axis.housing_degC, axis.allowance_A, holding);
+    text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n", time_s,
+                        state.bus_V, a, mode_text(axis.mode), axis.id_A, axis.iq_A, axis.speed_rad_per_s, core,
+                        axis.housing_degC, axis.allowance_A, holding);
   }
   return text;
 }
@@ -68,7 +72,7 @@ std::string Live::table(const wire::State& state) const {
 void Live::show(const wire::State& state, double time_s) {
   if (time_s - drawn_s_ < (terminal_ ? 0.05 : 0.5)) return;
   drawn_s_ = time_s;
-  std::string text = fmt::format("{:7.2f} s   bus {:.1f} V\n", time_s, state.bus_V) + table(state);
+  std::string text = table(state, time_s);
   if (terminal_) {
     for (int a = 0; a < wire::axis_count; ++a) {
       const wire::AxisReport& axis = state.axis[a];
@@ -91,6 +95,8 @@ void Live::show(const wire::State& state, double time_s) {
     for (const char c : text) drawn += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
     lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
     text = drawn;
+  } else {
+    lines_ = 1;  // the header stands
   }
   fmt::print("{}", text);
   std::fflush(stdout);

@@ -25,7 +25,7 @@ class Live {
   struct Trail {
     std::vector<float> core_degC, housing_degC, iq_A, allowance_A;
   };
-  std::string table(const wire::State& state) const;
+  std::string table(const wire::State& state, double time_s) const;
 
   std::uint8_t mask_;
   bool terminal_;

@@ -30,7 +30,7 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
   Driven driven;
   {
     Armed armed(session, mask);
-    driven = drive(session, mask, profile, [&](const wire::State& state, double time_s) {
+    driven = drive(session, mask, profile, Along::q, [&](const wire::State& state, double time_s) {
       if (!console.options.json) live.show(state, time_s);
     });
   }
@@ -40,8 +40,8 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
   text += ".\n";
   if (driven.held_back_s > 0.02) {
     const wire::CodeText why = wire::text_of(driven.limit);
-    text +=
-        fmt::format("Held back for {:.2f} s, at last because {}; {}.\n", driven.held_back_s, why.happened, why.advice);
+    text += fmt::format("Held back for {:.2f} s, at last because {}. What to do: {}.\n", driven.held_back_s,
+                        why.happened, why.advice);
   }
   console.say(text, json_of(driven));
 }

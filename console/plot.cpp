@@ -86,16 +86,15 @@ std::string plot(const std::vector<PlotLine>& lines, int width, int height, floa
     if (row == 0) scale = fmt::format("{:.4g}", range.high);
     if (row == rows - 1) scale = fmt::format("{:.4g}", range.low);
     text += fmt::format("{:>{}} ", scale, scale_width);
+    int colour = 0;
     for (int c = 0; c < cells; ++c) {
       const Cell& cell = grid[static_cast<std::size_t>(row * cells + c)];
-      if (cell.dots == 0)
-        text += ' ';
-      else if (colours)
-        text +=
-            fmt::format("\033[{}m{}\033[0m", ansi_colours[cell.line % ansi_colours.size()], utf8(0x2800 + cell.dots));
-      else
-        text += utf8(0x2800 + cell.dots);
+      const int wanted = cell.dots == 0 || !colours ? 0 : ansi_colours[cell.line % ansi_colours.size()];
+      if (wanted != colour) text += fmt::format("\033[{}m", wanted);
+      colour = wanted;
+      text += cell.dots == 0 ? " " : utf8(0x2800 + cell.dots);
     }
+    if (colour != 0) text += "\033[0m";
     text += '\n';
   }
   text += std::string(scale_width + 1, ' ');

@@ -2,6 +2,7 @@
 #include "firmware/axis.hpp"
 
 #include <cmath>
+#include <limits>
 #include <new>
 
 #include "thermal/losses.hpp"
@@ -278,6 +279,7 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   const int steps = static_cast<int>(static_cast<float>(sums.periods) * period_s_ * slow_Hz + 0.5f);
   core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
+  housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();
 }
 

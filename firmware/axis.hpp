@@ -216,6 +216,7 @@ class Axis {
   std::uint32_t tripped_periods_ = 0;
   float period_s_ = 0.0f;
   FaultRecord fault_;
+  float housing_measured_degC_ = unset;
   AxisState state_;
   std::uint8_t index_;
 };

@@ -15,6 +15,7 @@ struct SimulatedBoard {
   /// false: time passes only in Transport::wait, and there as fast as the computer can; now_s() is the board's own
   /// time.
   bool real_time = true;
+  bool full_motors = true;          // false: simpler ones at a hundredth of the cost, for many boards
   std::string motor_folder;         // where motor sheets lie
   std::string motor = "ec-16-40w";  // on both axes; its parameters are set and saved
 };

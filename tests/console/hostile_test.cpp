@@ -13,6 +13,7 @@
 #include <cstdlib>
 
 #include "console/commands.hpp"
+#include "console/profile.hpp"
 #include "tests/console/fake_board.hpp"
 
 namespace {
@@ -179,6 +180,26 @@ TEST(HostileDevice, NoFrameIsBelievedBeyondItsBytes) {
   EXPECT_GT(taken, cases() / 10);
   std::printf("  %llu cases, %llu whole frames, %llu believed, %u torn\n", static_cast<unsigned long long>(cases()),
               static_cast<unsigned long long>(whole), static_cast<unsigned long long>(taken), reader.bad());
+}
+
+TEST(HostileText, AProfileIsReadOrRefused) {
+  Dice dice(3);
+  const std::string letters = "0123456789 .,-+eEAmsinf\t";
+  int read = 0;
+  for (std::uint64_t i = 0; i < cases() / 10; ++i) {
+    std::string text;
+    if (dice.below(2) == 0) text = "20A 0.3s, +6 5s,\t-250 mA  2min";
+    for (std::size_t n = 1 + dice.below(6); n > 0; --n)
+      text.insert(dice.below(text.size() + 1), 1, letters[dice.below(letters.size())]);
+    try {
+      for (const console::Piece& piece : console::profile_in(text, 4))
+        ASSERT_TRUE(std::isfinite(piece.current_A) && piece.seconds > 0) << text;
+      ++read;
+    } catch (const wire::pc::UserError& error) {
+      ASSERT_EQ(error.exit_code(), 2);
+    }
+  }
+  EXPECT_GT(read, 0);
 }
 
 /// Whole commands against a board whose every answer may be broken: each ends with one of the documented codes.

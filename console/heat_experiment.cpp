@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#include "console/heat_experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "wire/pc/toml_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace console {
+namespace {
+
+using wire::pc::Exit;
+using wire::pc::UserError;
+
+double value_of(const Values& values, const std::string& name) {
+  const auto at = values.find(name);
+  if (at == values.end() || std::isnan(at->second)) {
+    throw UserError(Exit::usage,
+                    fmt::format("{} is {} on this axis; set it from the motor's sheet first, then identify.", name,
+                                at == values.end() ? "not known" : "unset"));
+  }
+  return double{at->second};
+}
+
+}  // namespace
+
+double continuous_A(const Values& values) {
+  const auto get = [&](const char* name) { return value_of(values, name); };
+  const double rise_K = get("winding_max_degC") - get("ambient_degC");
+  const double warm = 1 + get("copper_coefficient_per_K") * (get("winding_max_degC") - 25);
+  // All of the heat passes both resistances: 3/2 R i^2 (R1 + R2) = rise.
+  return std::sqrt(rise_K / (1.5 * get("phase_resistance_ohm") * warm * (get("R1_K_per_W") + get("R2_K_per_W"))));
+}
+
+std::vector<Piece> designed_course(double continuous_A, double minutes) {
+  // Shares of the continuous current and seconds: levels apart by design, bursts short enough for any winding that the
+  // look-ahead of a healthy board allows, rests in between.
+  constexpr struct {
+    double share, seconds;
+  } round[] = {{0.9, 120}, {0.0, 60}, {2.5, 2},  {0.3, 15}, {2.0, 4}, {0.3, 15},
+               {2.5, 2},   {0.0, 20}, {0.6, 90}, {1.8, 5},  {0.0, 67}};
+  std::vector<Piece> course;
+  double left_s = 60 * minutes;
+  for (int i = 0; left_s > 0; i = (i + 1) % static_cast<int>(std::size(round))) {
+    const double seconds = std::min(round[i].seconds, left_s);
+    course.push_back({static_cast<float>(round[i].share * continuous_A), static_cast<float>(seconds)});
+    left_s -= seconds;
+  }
+  return course;
+}
+
+std::string sheet_of(const Values& values, const std::string& name) {
+  const auto get = [&](const char* key) { return value_of(values, key); };
+  const double pole_pairs = get("pole_pairs");
+  return fmt::format(
+      "name = \"{}\"\nsource = \"the parameters in force on the board\"\n"
+      "terminal_resistance_ohm = {:.9g}\nterminal_inductance_mH = {:.9g}\ntorque_constant_mNm_per_A = {:.9g}\n"
+      "pole_pairs = {}\nrotor_inertia_gcm2 = 1.0  # not a board's parameter, and nothing of heat depends on it\n"
+      // Amplitude i heats like sqrt(3)/2 i of direct current (wire/motor.hpp).
+      "rated_current_A = {:.9g}\nR1_K_per_W = {:.9g}\nR2_K_per_W = {:.9g}\ntau_winding_s = {:.9g}\ntau_motor_s = "
+      "{:.9g}\n"
+      "winding_max_degC = {:.9g}\ncopper_coefficient_per_K = {:.9g}\n",
+      name, 2 * get("phase_resistance_ohm"), 2e3 * get("inductance_d_H"),
+      1e3 * std::sqrt(3.0) * pole_pairs * get("flux_linkage_Wb"), pole_pairs, continuous_A(values) * std::sqrt(3.0) / 2,
+      get("R1_K_per_W"), get("R2_K_per_W"), get("R1_K_per_W") * get("C1_J_per_K"),
+      get("R2_K_per_W") * get("C2_J_per_K"), get("winding_max_degC"), get("copper_coefficient_per_K"));
+}
+
+Values parameters_of_model(const std::string& path, std::string& why) {
+  const toml::table file = wire::pc::parse_toml(path);
+  const auto array = [&](const char* key) {
+    const toml::array* list = file[key].as_array();
+    return list != nullptr ? *list : toml::array{};
+  };
+  const toml::array nodes = array("node"), links = array("link"), sources = array("source");
+  if (nodes.size() != 2) return why = "a further mass or a hot spot", Values{};
+  Values found;
+  const auto put = [&](const char* name, double value) { found[name] = static_cast<float>(value); };
+  put("C1_J_per_K", nodes[0].as_table()->at_path("capacity_J_per_K").value_or(NAN));
+  put("C2_J_per_K", nodes[1].as_table()->at_path("capacity_J_per_K").value_or(NAN));
+  for (const toml::node& node : links) {
+    const toml::table& link = *node.as_table();
+    const std::string law = link["law"].value_or(std::string()), to = link["to"].value_or(std::string());
+    const auto from = link["from"].value<int>(), to_node = link["to"].value<int>();
+    if (law != "constant") return why = "heat flow by the law '" + law + "'", Values{};
+    const double resistance = 1 / link["conductance_W_per_K"].value_or(NAN);
+    if (from == 0 && to_node == 1)
+      put("R1_K_per_W", resistance);
+    else if (from == 1 && to == "ambient")
+      put("R2_K_per_W", resistance);
+    else
+      return why = "heat flow to " + (to.empty() ? "another mass" : to), Values{};
+  }
+  for (const toml::node& node : sources) {
+    const toml::table& source = *node.as_table();
+    const std::string drive = source["drive"].value_or(std::string());
+    if (drive == "power_W") continue;  // a slot for heat measured elsewhere; it makes none by itself
+    if (drive != "current_A2" || source["node"].value_or(0) != 0) return why = "heat that goes with " + drive, Values{};
+    if (const auto k = source["coefficient_per_K"].value<double>()) put("copper_coefficient_per_K", *k);
+  }
+  put("housing_lag_s", file.at_path("housing_sensor.lag_s").value_or(0.0));
+  put("housing_offset_K", file.at_path("housing_sensor.offset_K").value_or(0.0));
+  if (file.at_path("housing_sensor.gain_error").value_or(0.0) != 0) return why = "a sensor gain that is off", Values{};
+  for (const auto& [name, value] : found) {
+    if (!std::isfinite(value)) return why = "no finite " + name, Values{};
+  }
+  return found;
+}
+
+}  // namespace console

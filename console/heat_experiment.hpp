@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// What the console does itself about thermal identification: the course of current that is run, the sheet that identify
+// starts from, and what of the model that it found fits into a board's parameters. Pure: no board, no program.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "console/profile.hpp"
+
+namespace console {
+
+/// Values of one axis by name without axis: "R1_K_per_W".
+using Values = std::map<std::string, float>;
+
+/// The steady amplitude that would bring the winding to its limit in the end, from the board's own parameters.
+/// Throws UserError (usage) naming the first one that is unset.
+double continuous_A(const Values& values);
+
+/// Steps of a minute and more tell the housing's resistance and capacity, bursts of seconds the winding's, rests both.
+/// Amperes are shares of the continuous current up to 2.5 times; the governor may cut bursts, which the log then shows.
+std::vector<Piece> designed_course(double continuous_A, double minutes);
+
+/// A motor sheet (TOML) that says what the board believes: identify's gauge is then the board's resistance.
+std::string sheet_of(const Values& values, const std::string& name);
+
+/// Parameters that the model file of identify (--write-model) comes to on this board; empty if the model has something
+/// that they cannot express, and `why` says what.
+Values parameters_of_model(const std::string& path, std::string& why);
+
+}  // namespace console

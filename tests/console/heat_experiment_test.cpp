@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "console/heat_experiment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "wire/pc/motor_file.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace {
+
+console::Values believed() {
+  return {{"phase_resistance_ohm", 0.5f},
+          {"inductance_d_H", 3e-5f},
+          {"flux_linkage_Wb", 4.33e-3f},
+          {"pole_pairs", 1.0f},
+          {"R1_K_per_W", 1.08f},
+          {"R2_K_per_W", 16.3f},
+          {"C1_J_per_K", 1.13f},
+          {"C2_J_per_K", 18.04f},
+          {"winding_max_degC", 155.0f},
+          {"ambient_degC", 40.0f},
+          {"copper_coefficient_per_K", 0.00393f}};
+}
+
+std::string file(const std::string& name, const std::string& text) {
+  const std::string path = testing::TempDir() + name;
+  std::ofstream(path) << text;
+  return path;
+}
+
+TEST(HeatExperiment, TheContinuousCurrentHoldsTheLimitInTheEnd) {
+  const double amplitude_A = console::continuous_A(believed());
+  const double heat_W = 1.5 * 0.5 * (1 + 0.00393 * 130) * amplitude_A * amplitude_A;
+  EXPECT_NEAR(heat_W * (1.08 + 16.3), 115.0, 1e-3);
+}
+
+TEST(HeatExperiment, AnUnsetParameterIsNamed) {
+  auto values = believed();
+  values["R2_K_per_W"] = std::nanf("");
+  try {
+    (void)console::continuous_A(values);
+    FAIL();
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("R2_K_per_W is unset"), std::string::npos) << error.what();
+  }
+}
+
+TEST(HeatExperiment, TheCourseHasItsLengthAndNoBurstBeyondItsShare) {
+  double length_s = 0, most_A = 0;
+  for (const auto& piece : console::designed_course(4.0, 17)) {
+    length_s += double{piece.seconds};
+    most_A = std::max(most_A, double{piece.current_A});
+  }
+  EXPECT_NEAR(length_s, 17 * 60, 1e-3);
+  EXPECT_DOUBLE_EQ(most_A, 10.0);
+}
+
+TEST(HeatExperiment, TheSheetSaysWhatTheBoardBelieves) {
+  const auto motor = wire::pc::read_motor(file("sheet.toml", console::sheet_of(believed(), "x")), "").motor;
+  EXPECT_NEAR(motor.phase_resistance_ohm, 0.5, 1e-7);
+  EXPECT_NEAR(motor.flux_linkage_Wb, 4.33e-3, 1e-9);
+  EXPECT_NEAR(motor.C1_J_per_K, 1.13, 1e-6);
+  EXPECT_NEAR(motor.C2_J_per_K, 18.04, 1e-5);
+  EXPECT_NEAR(motor.R2_K_per_W, 16.3, 1e-5);
+}
+
+const std::string two_resistors =
+    "format = 1\n[[node]]\ncapacity_J_per_K = 0.5\n[[node]]\ncapacity_J_per_K = 20\n"
+    "[[link]]\nfrom = 0\nto = 1\nlaw = \"constant\"\nconductance_W_per_K = 0.5\n"
+    "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"constant\"\nconductance_W_per_K = 0.1\n"
+    "[[source]]\nnode = 0\ndrive = \"current_A2\"\ngain = 0.75\ncoefficient_per_K = 0.004\n";
+
+TEST(HeatExperiment, AModelOfTwoResistorsBecomesParameters) {
+  std::string why;
+  const auto found = console::parameters_of_model(
+      file("model.toml", two_resistors + "[housing_sensor]\nnode = 1\nlag_s = 2\noffset_K = -1.5\ngain_error = 0\n"),
+      why);
+  const console::Values expected = {{"C1_J_per_K", 0.5f},
+                                    {"C2_J_per_K", 20.0f},
+                                    {"R1_K_per_W", 2.0f},
+                                    {"R2_K_per_W", 10.0f},
+                                    {"housing_lag_s", 2.0f},
+                                    {"housing_offset_K", -1.5f},
+                                    {"copper_coefficient_per_K", 0.004f}};
+  EXPECT_EQ(found, expected) << why;
+}
+
+TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
+  const auto refused = [](const std::string& text, const std::string& words) {
+    std::string why;
+    EXPECT_TRUE(console::parameters_of_model(file("model.toml", text), why).empty());
+    EXPECT_NE(why.find(words), std::string::npos) << why;
+  };
+  refused("[[node]]\ncapacity_J_per_K = 1\n", "further mass");
+  refused(two_resistors + "[[source]]\nnode = 1\ndrive = \"speed_rad_per_s\"\ngain = 0.1\n", "speed_rad_per_s");
+  refused(two_resistors + "[[link]]\nfrom = 1\nto = \"frame\"\nlaw = \"constant\"\nconductance_W_per_K = 0.1\n",
+          "frame");
+  refused(two_resistors + "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.1\n",
+          "radiation");
+  refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n", "gain");
+}
+
+}  // namespace
