@@ -3,8 +3,10 @@
 // records copies words and need not know the axis. A place holds as long as its axis.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace firmware {
 
@@ -34,19 +36,31 @@ static_assert(signals_well_declared(), "ids must rise");
 class SignalPlace {
  public:
   constexpr SignalPlace() = default;
-  explicit constexpr SignalPlace(const float& value) : number_(&value) {}
-  /// `code` is an enum of one byte.
+  explicit SignalPlace(const float& value) : word_(&value) {}
+  /// `code` is an enum of one byte, inside of an object that is aligned to words.
   template <class Code>
-  explicit SignalPlace(const Code& code) : code_(reinterpret_cast<const std::uint8_t*>(&code)) {
+  explicit SignalPlace(const Code& code) {
     static_assert(sizeof(Code) == 1);
+    const std::size_t byte = reinterpret_cast<std::uintptr_t>(&code) % sizeof(std::uint32_t);
+    word_ = reinterpret_cast<const std::uint8_t*>(&code) - byte;
+    code_shift_ = static_cast<std::int8_t>(8 * byte);
   }
 
-  bool exists() const { return number_ != nullptr || code_ != nullptr; }
-  float value() const { return number_ != nullptr ? *number_ : static_cast<float>(*code_); }
+  bool exists() const { return word_ != nullptr; }
+  /// For the control interrupt: the word as it lies, to be understood later.
+  std::uint32_t raw() const {
+    std::uint32_t word;
+    std::memcpy(&word, word_, sizeof word);
+    return word;
+  }
+  float value_of(std::uint32_t raw) const {
+    return code_shift_ < 0 ? std::bit_cast<float>(raw) : static_cast<float>(raw >> code_shift_ & 0xFF);
+  }
+  float value() const { return value_of(raw()); }
 
  private:
-  const float* number_ = nullptr;
-  const std::uint8_t* code_ = nullptr;
+  const void* word_ = nullptr;
+  std::int8_t code_shift_ = -1;  // negative: it is a float
 };
 
 }  // namespace firmware

@@ -78,7 +78,7 @@ std::uint32_t put_rows(std::uint32_t available, const Selection& selection, std:
                        static_cast<std::uint8_t>(selection.count),
                        static_cast<std::uint8_t>(rows)});
   for (std::uint32_t k = 0; k < rows; ++k) {
-    for (std::uint32_t i = 0; i < selection.count; ++i) reply.put(row_at(k)[1 + i]);
+    for (std::uint32_t i = 0; i < selection.count; ++i) reply.put(selection.places[i].value_of(row_at(k)[1 + i]));
   }
   return rows;
 }
