@@ -33,7 +33,8 @@ struct Driven {
   std::uint8_t limit = 0;  // what held it back most recently
 };
 
-/// Where the current goes: iq turns the shaft, id only heats the winding and holds the rotor where it is.
+/// Where the current goes: iq turns the shaft; id makes no torque and only heats the winding, and a shaft that creeps
+/// all the same is held by a little iq.
 enum class Along { q, d };
 
 /// Plays a course of current on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError:

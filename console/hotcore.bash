@@ -19,7 +19,7 @@ _hotcore() {
   else
     case $command in
       get) words=$("${COMP_WORDS[0]}" "${choice[@]}" get --names 2>/dev/null) ;;
-      set) words=$("${COMP_WORDS[0]}" "${choice[@]}" get --names 2>/dev/null | sed 's/$/=/'); compopt -o nospace ;;
+      set) words=$("${COMP_WORDS[0]}" "${choice[@]}" get --names 2>/dev/null | sed 's/$/=/'); compopt -o nospace 2>/dev/null ;;
       watch | log | capture) words=$("${COMP_WORDS[0]}" "${choice[@]}" signals --names 2>/dev/null) ;;
       *) COMPREPLY=($(compgen -f -- "$word")); return ;;
     esac

@@ -108,8 +108,8 @@ void identify(Console& console, const Arguments& a) {
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
   console.tell(
-      fmt::format("Heating axis {} for {:g} min with up to {:.1f} A along the magnet: the rotor turns to one place and "
-                  "stays there. Ctrl-C disarms.",
+      fmt::format("Heating axis {} for {:g} min with up to {:.1f} A along the magnet, which makes no torque; the shaft "
+                  "must be free to stand still. Ctrl-C disarms.",
                   axis, a.minutes, 2.5 * rated_A));
   const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));

@@ -1,0 +1,58 @@
+# Every command of hotcore on the simulated board of --sim, which is the firmware itself: exit code and what is said.
+#   cmake -D HOTCORE=.../hotcore -D IDENTIFY=.../identify -D SCRATCH=... -P simulated.cmake
+cmake_minimum_required(VERSION 3.25)
+file(REMOVE_RECURSE ${SCRATCH})
+file(MAKE_DIRECTORY ${SCRATCH})
+set(ENV{HOTCORE_SIM_FAST} 1)  # simulated time does not wait for the world's
+set(failures "")
+
+# expect(NAME code regex PROGRAM ARGUMENTS...), standard input from ${typed}
+function(expect name code regex)
+  file(WRITE ${SCRATCH}/typed "${typed}")
+  execute_process(COMMAND ${ARGN} WORKING_DIRECTORY ${SCRATCH} INPUT_FILE ${SCRATCH}/typed
+                  RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE err TIMEOUT 120)
+  if(NOT result EQUAL code OR NOT "${out}${err}" MATCHES "${regex}")
+    list(APPEND failures "${name}: exit code ${result} (wanted ${code}), did not match '${regex}': ${out}${err}")
+    set(failures "${failures}" PARENT_SCOPE)
+  else()
+    message(STATUS "${name}: exit code ${result}: ${CMAKE_MATCH_0}")
+  endif()
+endfunction()
+set(sim ${HOTCORE} --sim)
+set(typed "")
+
+expect(list 0 "SIM0" ${sim} list)
+expect(get 0 "axis1.R1_K_per_W +1.08" ${sim} get)
+expect(set 0 "axis0.current_limit_A +20 -> 12.*Saved" ${sim} set axis0.current_limit_A=12 --save)
+expect(set_that_the_board_refuses 8 "refused to put the parameters in force: axis0.bus_" ${sim} set axis0.bus_low_end_V=90)
+expect(save 0 "Saved" ${sim} save)
+expect(diff 0 "axis0.phase_resistance_ohm +0.5 +unset" ${sim} diff)
+expect(backup 0 "Written: mine.toml" ${sim} backup mine.toml)
+expect(no_difference 0 "No difference to mine.toml" ${sim} diff mine.toml)
+expect(restore 0 "Nothing changed" ${sim} restore mine.toml)
+expect(arm 0 "Done in 0.5" ${sim} arm --iq 1 --seconds 0.5)
+expect(run 0 "Done in 0.5.*peak current 5.*disarmed|disarmed: peak current 5" ${sim} run "5A 0.3s, 0A 0.2s" --axis 1)
+expect(stop 0 "Disarmed: both axes" ${sim} stop)
+expect(calibrate 0 "axis 1: the current sensors' offsets are" ${sim} calibrate)
+expect(fault 0 "axis 0: no fault" ${sim} fault)
+expect(ask 0 "Yes: the hottest winding would reach" ${sim} ask "5A 0.3s")
+expect(ask_too_much 0 "Not in full" ${sim} ask "20A 5s")
+expect(signals 0 "axis0.housing_measured_degC" ${sim} signals)
+expect(watch 0 "\"core_degC\":2[45]" ${sim} watch --seconds 0.2 --json)
+expect(watch_signals 0 "axis1.ia_A" ${sim} watch axis1.ia_A --seconds 1)
+expect(capture 0 "500 rows, 100 of them before" ${sim} capture axis0.ia_A --trigger axis0.ia_A --edge rising --level 0.01)
+expect(udev 0 "SUBSYSTEM==\"usb\"" ${HOTCORE} udev)
+
+# What was logged goes to identify as it is. Nothing moved, so identify says that it cannot tell, and says it about heat.
+expect(log 0 "Written: x.csv .6000 rows" ${sim} log --out x.csv --seconds 600 --rate 10)
+expect(identify_reads_the_log 0 "Verdict: " ${IDENTIFY} x.csv --motor ec-16-40w)
+
+set(typed "set axis0.current_limit_A=7\nget axis0.current_limit_A\nbogus\nrun \"3A 0.1s\"\nquit\n")
+expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
+set(typed "")
+expect(identification 0 "Log, model and report: found" ${sim} identify --minutes 6 --out found --yes)
+
+if(failures)
+  list(JOIN failures "\n  " text)
+  message(FATAL_ERROR "not as promised:\n  ${text}")
+endif()
