@@ -10,6 +10,7 @@ namespace identify {
 struct HoldOut {
   std::vector<Log> logs;  // whole logs, or none
   double fraction = 0;    // last part of each log, 0: none
+  int draws = 1000;       // of the bootstrap
 };
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots).

@@ -34,6 +34,7 @@ struct Arguments {
   std::vector<std::string> logs, columns, truths;
   std::string motor, map, hold_out, json, html, write_model, write_baseline;
   bool explain = false;
+  int draws = 1000;
 };
 
 std::vector<Log> read(const std::string& path, const identify::ColumnMap& map,
@@ -115,7 +116,8 @@ int answer(Arguments a) {
   if (!a.map.empty()) map = identify::read_map(a.map);
   for (const std::string& column : a.columns) identify::add_column(map, column);
   if (!a.truths.empty()) return score(a, map, motor);
-  const identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
+  identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
+  held.draws = a.draws;
   std::vector<Log> logs;
   for (const std::string& path : a.logs) {
     for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
@@ -150,6 +152,9 @@ int main(int argc, char** argv) {
   app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")
       ->allow_extra_args(false);
   app.add_option("--hold-out", a.hold_out, "a log, or a fraction of each log, that is scored and not fitted");
+  app.add_option("--bootstrap", a.draws, "draws for the interval of the held-out error, 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
   app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
   app.add_option("--html", a.html, "write a page with pictures");
   app.add_option("--write-model", a.write_model, "write the model found as a heat-network parameter set");

@@ -46,10 +46,17 @@ struct Rung {  // one candidate of the ladder
   bool chosen, tied;
 };
 
+struct Interval {
+  double low, high;
+};
+
 struct HeldOut {
   std::string how;
   Rmse before, after;
-  std::vector<Rmse> each_before;  // per log, when whole logs were held out
+  bool winding = false;                         // whose rms the intervals are of; else the housing's
+  int blocks = 0;                               // of a minute
+  std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few
+  std::vector<Rmse> each_before;                // per log, when whole logs were held out
   std::vector<std::string> names;
 };
 
@@ -71,6 +78,9 @@ struct Gain {
   double continuous_A_before = 0, continuous_A_after = 0;     // that it promises for an hour
   double burst_A = 0, speed_rad_per_s = 0, ambient_degC = 0;  // of that push; amperes as in the log
 };
+
+/// Needs the intervals to be there.
+std::string interval_words(const HeldOut& held_out);
 
 /// The gain in words, for text and page.
 struct GainLine {

@@ -175,6 +175,7 @@ std::string as_html(const Report& r) {
     if (!r.causes.empty()) errors("the same, extended model", r.held_out->after);
   }
   s += "</table>\n";
+  if (r.held_out && r.held_out->before_95) s += "<p>" + escaped(interval_words(*r.held_out)) + "</p>\n";
   if (r.gain) {
     s += "<h2>What it is worth</h2><p>" + escaped(gain_conditions(*r.gain)) + "</p><table>" +
          row({"", "two resistors", "extended"}, "th");

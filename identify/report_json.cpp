@@ -92,6 +92,13 @@ std::string as_json(const Report& r) {
                        {"worst_before_K", number(worst(r.held_out->before))},
                        {"worst_after_K", number(worst(r.held_out->after))}};
   }
+  if (r.held_out && r.held_out->before_95) {
+    const auto pair = [](const Interval& i) { return ordered_json::array({number(i.low), number(i.high)}); };
+    out["held_out"]["interval_95_K"] = {{"of", r.held_out->winding ? "core" : "housing"},
+                                        {"before", pair(*r.held_out->before_95)},
+                                        {"after", pair(*r.held_out->after_95)},
+                                        {"blocks", r.held_out->blocks}};
+  }
   out["gain"] = nullptr;
   if (r.gain) {
     out["gain"] = {{"overshoot_before_K", number(r.gain->overshoot_before_K)},

@@ -27,6 +27,12 @@ std::string rmse(const Rmse& r) {
 
 }  // namespace
 
+std::string interval_words(const HeldOut& h) {
+  return fmt::format("95 of 100 draws of {} blocks of a minute: {} {:.2f} to {:.2f} K before, {:.2f} to {:.2f} K after",
+                     h.blocks, h.winding ? "winding" : "housing", h.before_95->low, h.before_95->high, h.after_95->low,
+                     h.after_95->high);
+}
+
 std::string gain_conditions(const Gain& g) {
   return fmt::format(
       "the board with the two-resistor model and with the extended one, if the motor is as the extended one says; a "
@@ -113,6 +119,7 @@ std::string as_text(const Report& r, bool explain) {
       s += fmt::format("    {}: {}\n", r.held_out->names[i], rmse(r.held_out->each_before[i]));
     }
     if (!r.causes.empty()) s += "  after:  " + rmse(r.held_out->after) + "\n";
+    if (r.held_out->before_95) s += "  " + interval_words(*r.held_out) + "\n";
   }
   if (r.gain) {
     s += "\nWhat it is worth: " + gain_conditions(*r.gain) + "\n";

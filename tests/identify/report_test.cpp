@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "identify/discover.hpp"
+#include "identify/held_out.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 
@@ -45,7 +46,7 @@ const std::string maps = HOTCORE_SOURCE_DIR "/identify/maps/";
 TEST(Report, JsonHoldsTheFieldsOfTheContract) {
   tests::BenchOptions options;
   options.core_every_s = 20;
-  options.seconds = 600;
+  options.seconds = 900;
   identify::HoldOut held;
   held.fraction = 0.3;
   const json j = json::parse(identify::as_json(report_of(options, held)));
@@ -63,6 +64,30 @@ TEST(Report, JsonHoldsTheFieldsOfTheContract) {
   EXPECT_TRUE(j["baseline"]["where"].is_array());
   for (const char* key : {"how", "rmse_before_K", "rmse_after_K", "worst_before_K", "worst_after_K"})
     EXPECT_TRUE(j["held_out"].contains(key)) << key;
+  const json& interval = j["held_out"].at("interval_95_K");
+  EXPECT_EQ(interval.at("of"), "core");
+  const double error_K = j["held_out"]["rmse_before_K"]["core"];
+  EXPECT_LE(interval.at("before").at(0).get<double>(), error_K);
+  EXPECT_GE(interval.at("before").at(1).get<double>(), error_K);
+}
+
+TEST(Report, ACauseThatDoesNotGoOnIsRefusedByTheDataNotFitted) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seconds = 1200;
+  const auto veto = [&](const char* id) {
+    const auto path = tests::write_bench_log("hotcore_veto.csv", options);
+    const auto logs = identify::logs_of(identify::read_table(path), {}, std::nullopt);
+    const auto problem =
+        identify::problem_of(logs, wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+    return identify::veto(problem, identify::fit(problem, {}),
+                          identify::fit(problem, {{identify::cause_named(id), -1}}));
+  };
+  // A warm wind in the last of what is fitted looks like a drift, which the data after it does not go on with.
+  options.extra_housing_W = [](double t, double, double) { return t > 750 && t < 900 ? 1.0 : 0.0; };
+  EXPECT_NE(veto("ambient_drift").find("refused"), std::string::npos);
+  options.extra_housing_W = [](double t, double, double) { return 0.001 * t; };
+  EXPECT_EQ(veto("ambient_drift"), "");
 }
 
 TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {

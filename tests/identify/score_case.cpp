@@ -113,7 +113,8 @@ void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<
   auto both = first;
   for (identify::Log& more : read(log, path)) both.push_back(std::move(more));
   CaseResult again;
-  const Search now = identify::search(identify::problem_of(both, sheet_of(log)), options.margins, options.removed);
+  Problem joint = identify::problem_of(both, sheet_of(log));
+  const Search now = identify::concluded(joint, options.margins, options.removed);
   again.truth = result.truth;
   again.verdict = now.verdict;
   again.answer = now.tied;
@@ -152,8 +153,8 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.truth = options.log.effects;
   std::sort(result.truth.begin(), result.truth.end());
   const std::clock_t start = std::clock();
-  const Problem problem = identify::problem_of(logs, sheet_of(log));
-  const Search found = identify::search(problem, options.margins, options.removed);
+  Problem problem = identify::problem_of(logs, sheet_of(log));
+  const Search found = identify::concluded(problem, options.margins, options.removed);
   result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.verdict = found.verdict;
   result.answer = found.tied;

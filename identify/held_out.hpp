@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// Three parts of the data, so that none judges itself: fitted; not fitted, to refuse a cause that spoils it (veto); and
+// never looked at before the answer stands, to say what the answer is worth (final), with an interval.
+#pragma once
+
+#include "identify/baseline.hpp"
+
+namespace identify {
+
+/// Errors on the data held out by both models, with a bootstrap interval over blocks of a minute and more.
+HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                       const Fit& base, const Fit& extended, Report& report);
+
+/// Why the extended model must not be believed: fitted to the first three quarters of each log it misses the last by
+/// more than the two-resistor model does, and by more than chance explains. Empty: it may.
+std::string veto(const Problem& problem, const Fit& base, const Fit& extended);
+
+}  // namespace identify
