@@ -140,7 +140,8 @@ std::vector<Mutation> mutations() {
       bits("reference off", 0x40012304, 1u << 23),
       adc_bits("phase currents sampled for 480 cycles", 0x10, 0, 0x1FF),
       bits("no interrupt at the end of conversion", adc1 + 0x04, 1u << 7),
-      adc_bits("analog watchdog off", 0x04, 1u << 22),  // survives: the guard trips on the same sample
+      adc_bits("analog watchdog off", 0x04,
+               1u << 22),  // survives here: the guard trips on the same sample, later (guards_test)
       adc_bits("analog watchdog far too tight", 0x24, 0xFFF, 2060),
       bits("encoder counts one input only", tim3 + 0x08, 7, 1),
       misread("encoder turns backwards", tim3 + 0x24, [](std::uint32_t v) { return (4096 - v) & 4095; }),
