@@ -78,7 +78,7 @@ build_mutant() {
     command=${command//"$object"/"$scratch/$source.obj"}
     link=${link//"$object"/"$scratch/$source.obj"}
     changed=1
-    (cd "$build" && eval "${command/ -I/ -iquote $scratch -I}") >>"$scratch/build.log" 2>&1 || return 1
+    (cd "$build" && eval "${command/ -I/ -iquote $scratch -I} -w") >>"$scratch/build.log" 2>&1 || return 1
   done
   [ "$changed" -eq 1 ] || wrong "${names[i]}: nothing is made of $file"
   link=${link//bin\/h8-15d.elf/"$scratch/h8-15d.elf"}
