@@ -241,7 +241,7 @@ struct CaptureStatus {
 struct Rows {
   Answer answer;
   std::uint32_t first_period;
-  std::uint32_t dropped;  // rows lost since the subscription began, before these; 0 in a capture
+  std::uint32_t dropped;  // rows lost between subscription and sending; 0 in a capture
   std::uint16_t decimation;
   std::uint8_t signals, rows;
 };

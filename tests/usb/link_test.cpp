@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "boards/dual_48v_20a.hpp"
 #include "tests/usb/host.hpp"
 
 namespace {
@@ -16,6 +17,7 @@ using namespace usb_host;
 using wire::Kind;
 using wire::Status;
 
+constexpr std::uint8_t id_iq = 0x02, id_rotor = 0x0F, id_mode = 0x11, id_bus = 0x0E;
 constexpr auto number(Status s) { return static_cast<std::uint8_t>(s); }
 
 struct Linked : testing::Test {
@@ -182,6 +184,49 @@ TEST_F(Linked, ArmsAllOrNone) {
   board.advance(2);
   EXPECT_EQ(axis(0).mode(), firmware::Mode::off);
   EXPECT_EQ(axis(1).mode(), firmware::Mode::ready);
+}
+
+TEST_F(Linked, AnAxisThatMayNotArmKeepsTheOtherOff) {
+  axis(1).hold({wire::Fault::over_current, 1, 40.0f, 28.0f, 0.0f});
+  const auto refused = program.call_for<wire::Answer>(Kind::arm, {3});
+  EXPECT_EQ(refused.status, number(Status::tripped));
+  EXPECT_EQ(refused.axis, 1);
+  board.advance(2);
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::off);
+}
+
+TEST_F(Linked, ABusResetForgetsAPacketThatWaitedForRoom) {
+  bool data1 = board.bus().toggle(wire::link_out_endpoint);
+  for (std::uint8_t i = 0; i < 200; ++i) {  // nobody reads: the queue fills, the last packet waits
+    const Bytes packet = Program::framed(Kind::describe_parameter, i, {0, 0});
+    if (board.bus().out(Program::address, wire::link_out_endpoint, data1, packet) != Handshake::ack) break;
+    data1 = !data1;
+  }
+  program = Program(board);
+  program.connect();
+  program.pass(200);
+  EXPECT_TRUE(program.frames().empty()) << "answers to a host that has gone";
+  EXPECT_EQ(program.status(Kind::state), 0);
+}
+
+TEST_F(Linked, RowsThatMissPeriodsBeginANewFrame) {
+  const firmware::usb::Identity identity{"test", "0", "1"};
+  auto recorder = std::make_unique<firmware::Recorder>();
+  firmware::Commands commands(board.driver(), *recorder, board.parameters(), identity, boards::dual_48V_20A);
+  firmware::Reply reply;
+  const Bytes order = bytes_of(wire::Subscribe{1}, wire::SignalAddress{id_bus, 0});
+  commands.answer(
+      {static_cast<std::uint8_t>(Kind::subscribe), 0, static_cast<std::uint16_t>(order.size()), order.data()}, true,
+      reply);
+  for (const std::uint32_t period : {1u, 2u, 3u, 10u, 11u}) recorder->tick(period);
+  std::vector<std::pair<std::uint32_t, int>> frames;
+  for (;;) {
+    firmware::Reply rows;
+    wire::Rows head{};
+    if (!commands.telemetry(rows) || !wire::read(rows.bytes(), rows.count(), head)) break;
+    frames.emplace_back(head.first_period, head.rows);
+  }
+  EXPECT_EQ(frames, (std::vector<std::pair<std::uint32_t, int>>{{1, 3}, {10, 2}}));
 }
 
 TEST_F(Linked, ADisarmThatFollowsAnArmInTheSamePeriodWins) {
@@ -353,8 +398,6 @@ std::vector<Row> rows_of(const Bytes& payload, std::uint32_t& dropped) {
   }
   return out;
 }
-
-constexpr std::uint8_t id_iq = 0x02, id_rotor = 0x0F, id_mode = 0x11, id_bus = 0x0E;
 
 TEST_F(Linked, TelemetryComesAtItsPaceWithItsTime) {
   arm(1);
