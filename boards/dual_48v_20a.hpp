@@ -16,7 +16,9 @@ inline constexpr firmware::BoardRating dual_48V_20A{
     .bus_min_V = 12.0f,      // gate drivers lose their supply near 10 V
     .bus_max_V = 58.0f,      // 48 V + 20 %
     .dead_time_s = 500e-9f,  // longer than turn-off plus driver skew of such a stage (some 200 ns)
-    .sampling_window_s = 2e-6f,  // settling of a shunt amplifier (1 us) and one conversion (0.7 us)
+    // Shunts are sampled in the middle of the zero vector, so half of the window has to hold dead time (0.5 us),
+    // settling of a shunt amplifier (1 us) and three cycles of a 14 MHz ADC (0.21 us): 1.71 us, and some slack.
+    .sampling_window_s = 3.5e-6f,
 };
 static_assert(firmware::plausible(dual_48V_20A));
 

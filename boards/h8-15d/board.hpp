@@ -12,14 +12,7 @@
 
 namespace h8_15d {
 
-/// The shared power stage, but for its sampling window: shunts are sampled in the middle of the zero vector, so half of
-/// the window has to hold dead time, settling and sampling. Two microseconds would leave the amplifier half a
-/// microsecond.
-inline constexpr firmware::BoardRating rating = [] {
-  firmware::BoardRating r = boards::dual_48V_20A;
-  r.sampling_window_s = 3.5e-6f;
-  return r;
-}();
+inline constexpr firmware::BoardRating rating = boards::dual_48V_20A;
 
 // ---- clocks (RM0090 7.2, Figure 21) ---------------------------------------------------------------------------------
 inline constexpr std::uint32_t hsi_Hz = 16'000'000;  // 7.2.2, until the crystal runs
