@@ -67,7 +67,7 @@ TEST(Figures, ReachesTheThermalLimitAndHoldsIt) {
 }
 
 // Tolerances and why. Same plant, sheet and demands; other noise (the image has been on for longer), current scale 3 %
-// coarser, a sampling window of 3.5 instead of 2 us, setpoints up to 2 ms later, and a slow lane whose 10 ms begin
+// coarser, setpoints up to 2 ms later, and a slow lane whose 10 ms begin
 // elsewhere. Means of 20 ms:
 //   current that nothing limits: 0.2 A (the host's logged current carries the ripple's heat, up to 0.14 A of 17 A; this
 //   one is the motor's own; without it they differ by 0.006 A; 2 ms of the gait's 32 A/s are 0.06 A)
@@ -113,7 +113,7 @@ TEST_P(Agreement, OfTheImageWithTheHostBuildOnTheSameScene) {
       const auto &x = a.rows[i + window - 1], &y = b.rows[i + window - 1];
       estimated_K = std::max(estimated_K, std::abs(x.estimated_core_degC - y.estimated_core_degC));
       true_K = std::max(true_K, std::abs(x.true_core_degC - y.true_core_degC));
-      if (!steady || host_A < 0.5) continue;
+      if (!steady || std::abs(b.rows[i].demand_A) < 0.5) continue;  // of nothing the host logs the ripple
       ++compared;
       depth = std::max(depth, std::abs(chip_depth - host_depth));
       deepest = std::max(deepest, host_depth);
