@@ -213,9 +213,9 @@ TEST(Image, ASagOfTheLogicSupplyOpensTheGatesAndSavesTheHeat) {
   pcb->run_for(0.001);
   EXPECT_FALSE(pcb->duty(0).on || pcb->duty(1).on);
   EXPECT_FALSE(pcb->chip.port('B').drives_high(9) || pcb->chip.port('B').drives_high(2)) << "and the drivers are off";
+  EXPECT_TRUE(pcb->chip.flash.peek(Flash::cr) >> 31) << "locked again, before the watchdog resets";
   pcb->run_for(0.001);
   EXPECT_EQ(pcb->chip.flash.words_programmed() - words, h8_15d::HeatKeeper::record_words);
-  EXPECT_TRUE(pcb->chip.flash.peek(Flash::cr) >> 31) << "locked again";
   NO_TROUBLE(*pcb);
 }
 
