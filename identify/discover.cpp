@@ -126,7 +126,9 @@ std::string too_poor(const Problem& problem, const Fit& base) {
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
-  const Fit& best = found.chosen.fit;
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
+  // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
+  const Fit& best = found.singles.front().fit;
   Eigen::Index at = base_count;
   for (const Chosen& c : best.chosen) {
     const Cause& cause = causes()[static_cast<std::size_t>(c.cause)];

@@ -380,6 +380,27 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   return best.settled || best.x.size() == 0 || starts.size() == 1 ? best : descend(problem, chosen, c, best.x, most);
 }
 
+double cost_of_noise(const Problem& problem) {
+  const Noise& noise = problem.noise;
+  double sum = 0;
+  for (const Bins& log : problem.logs) {
+    Whitener housing(noise.housing_white_K, noise.housing_slow_K, noise.slow_s, log.width_s);
+    Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
+    const auto add = [&](Whitener& channel, double readings) {
+      if (readings > 0) {
+        channel.reading(readings);
+        sum -= std::log(channel.weight);
+      }
+      channel.step();
+    };
+    for (const Bin& bin : log.bins) {
+      add(housing, static_cast<double>(bin.housing_n));
+      add(core, static_cast<double>(bin.core_n));
+    }
+  }
+  return sum;
+}
+
 Fit transferred(const Problem& other, const Fit& from) {
   auto c = layout(other, from.chosen);
   Eigen::VectorXd x(static_cast<Eigen::Index>(c.size()));

@@ -41,6 +41,10 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
+/// What the noise model itself costs, half the sum of ln variance of all predicted readings: to compare fits that assume
+/// different noise.
+double cost_of_noise(const Problem& problem);
+
 /// The same model on other logs of the motor: base and causes held as in `from`, initial temperatures from the
 /// first readings.
 Fit transferred(const Problem& other, const Fit& from);

@@ -14,10 +14,10 @@ namespace {
 // Two causes at most: three at once imitate nearly anything (of seven forms that the table does not know, five were
 // "explained" by some three of it); two do not.
 //
-// Every pair is looked at with a few Newton steps, and those that may come near the best are fitted to the end. A look
-// errs by less than this in evidence, as far as the best pair is concerned.
+// Every pair is looked at with a few Newton steps, and those that may come near the best are fitted to the end: a look
+// errs by about so much evidence, or by this share of what the pair gains.
 constexpr int look_steps = 2;
-constexpr double look_errs = 40;
+constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
@@ -64,29 +64,6 @@ std::vector<Chosen> available(const Problem& problem, const std::vector<std::str
   return out;
 }
 
-/// Where the residual is more than noise, it is a model's error: larger than noise and alike for minutes. Differences
-/// between models are then as uncertain, and evidence counts by so much less: by the excess variance and by the number
-/// of neighbouring residuals that say the same (the integrated autocorrelation).
-double bluntness(const Problem& problem, const Candidate& c, double adequate_ratio) {
-  if (c.ratio < adequate_ratio) return 1;
-  double zero = 0;
-  std::vector<double> e;
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed r = replayed(problem, c.fit, static_cast<int>(l));
-    for (const double w : r.whitened) {
-      if (!std::isnan(w)) e.push_back(w), zero += w * w;
-    }
-  }
-  double alike = 1;
-  for (std::size_t lag = 1; lag < e.size() / 4; ++lag) {
-    double sum = 0;
-    for (std::size_t i = lag; i < e.size(); ++i) sum += e[i] * e[i - lag];
-    if (sum < 0.05 * zero) break;
-    alike += 2 * sum / zero;
-  }
-  return c.ratio * c.ratio * alike;
-}
-
 /// How far two fits differ, rms over the logs: the larger of winding and housing reading.
 double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
   double core = 0, housing = 0, n = 0;
@@ -128,6 +105,38 @@ void refine_core_noise(Problem& problem, const Fit& best) {
   if (n >= 10) problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), 0.5, 3.0);
 }
 
+/// A slow disturbance of the readings without a name, beside a set of causes: the one that makes the set's residual
+/// likeliest. Where it gains much over the noise alone, the set leaves something that is not noise.
+struct Disturbance {
+  Noise noise;
+  double gain = 0;      // over the noise alone
+  double evidence = 0;  // of the set with it; to compare sets that leave different disturbances
+};
+
+Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
+  const auto evidence = [](const Problem& p, const Fit& f) { return -f.bic() - 2 * cost_of_noise(p); };
+  const double own = evidence(problem, undisturbed);
+  Disturbance out{problem.noise, 0, own};
+  // One to four minutes: slower ones are the model's own time constants, faster ones the sensor's wander. Half as large
+  // again each time: coarser than that loses a gain of three.
+  for (const double slow_s : {60.0, 240.0}) {
+    Problem disturbed = problem;
+    disturbed.noise.slow_s = slow_s;
+    Fit warm = undisturbed;
+    for (double factor = 1.5; factor < 1000; factor *= 1.6) {
+      disturbed.noise.housing_slow_K = factor * problem.noise.housing_slow_K;
+      disturbed.noise.core_slow_K = factor * problem.noise.core_slow_K;
+      Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
+      if (f.x.size() == 0) break;
+      const double reached = evidence(disturbed, f);
+      if (reached > out.evidence) out = {disturbed.noise, reached - own, reached};
+      if (reached < out.evidence - 20) break;  // past the top
+      warm = std::move(f);
+    }
+  }
+  return out;
+}
+
 /// Every cause alone, best first.
 std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
                                   const std::vector<Candidate>& before) {
@@ -163,7 +172,8 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
   std::vector<Candidate> out;
   double best = 1e300;
   for (std::size_t i = 0; i < std::min(most_finished, looks.size()); ++i) {
-    if (hoped(looks[i]) > best + look_errs) break;
+    const double errs = std::max(look_errs, look_errs_share * (base.fit.bic() - best));
+    if (i > 0 && hoped(looks[i]) > best + errs) break;
     Fit f = fit(problem, looks[i].chosen, {&looks[i]});
     best = std::min(best, f.bic());
     out.push_back(candidate(base, std::move(f)));
@@ -172,15 +182,44 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
   return out;
 }
 
+/// Every cause alone and the pairs worth fitting, each best first, under the noise of the problem.
+struct Field {
+  Candidate base;
+  std::vector<Candidate> singles, pairs;
+};
+
+void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& field) {
+  Candidate base;
+  base.fit = field.base.fit.x.size() == 0 ? fit(problem, {}) : fit(problem, {}, {&field.base.fit});
+  base.ratio = ratio_of(base.fit);
+  field.base = std::move(base);
+  field.singles = singles_of(problem, all, field.base, field.singles);
+}
+
+void fit_pairs(const Problem& problem, Field& field) {
+  field.pairs = pairs_of(problem, field.base, field.singles);
+  // A second cause may only have helped the first out of a poor valley: each alone starts again from where the pair
+  // ended, and the pair must beat that.
+  for (std::size_t i = 0; i < std::min(beam, field.pairs.size()); ++i) {
+    for (Candidate& alone : field.singles) {
+      const auto& both = field.pairs[i].fit.chosen;
+      if (std::find(both.begin(), both.end(), alone.fit.chosen.front()) == both.end()) continue;
+      Fit again = fit(problem, alone.fit.chosen, {&field.pairs[i].fit});
+      if (again.x.size() > 0 && again.cost < alone.fit.cost) alone = candidate(field.base, std::move(again));
+    }
+  }
+  sort(field.singles);
+}
+
 /// Why the best pair is not believed; empty when it is.
-std::string why_no_pair(const Problem& problem, const std::vector<Candidate>& pairs, const Candidate& single,
-                        const Margins& margins) {
+std::string why_no_pair(const Problem& problem, const Field& field, const Margins& margins) {
+  const Candidate& single = field.singles.front();
   const std::string first = listed(single.fit.chosen);
-  if (pairs.empty()) return fmt::format("No further cause goes with {}.", first);
-  const Candidate& pair = pairs.front();
+  if (field.pairs.empty()) return fmt::format("No further cause goes with {}.", first);
+  const Candidate& pair = field.pairs.front();
   const std::string both = listed(pair.fit.chosen);
   const double more = pair.gain - single.gain;
-  if (!(more > margins.second * bluntness(problem, pair, margins.adequate_ratio)))
+  if (!(more > margins.second))
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
   const double moved = moved_K(problem, pair.fit, single.fit);
@@ -188,15 +227,17 @@ std::string why_no_pair(const Problem& problem, const std::vector<Candidate>& pa
     return fmt::format(
         "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.", both, more,
         moved);
+  const double nameless = disturbance_of(problem, single.fit).gain;
+  if (!(more > nameless + margins.second))
+    return fmt::format("{} would gain {:.1f} more than {}, a slow disturbance without a name {:.1f}: stopped there.",
+                       both, more, first, nameless);
   // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
-  if (pair.ratio > margins.adequate_ratio || single.ratio > margins.adequate_ratio) {
-    const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
-    const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
-    if (more_K > 1.1 * fewer_K)
-      return fmt::format(
-          "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
-          more_K, first, fewer_K);
-  }
+  const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
+  const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
+  if (more_K > 1.1 * fewer_K && disturbance_of(problem, pair.fit).gain > margins.remains)
+    return fmt::format(
+        "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
+        more_K, first, fewer_K);
   return "";
 }
 
@@ -230,64 +271,88 @@ std::vector<std::string> ids_of(const std::vector<Chosen>& chosen) {
 Search search(const Problem& given, const Margins& margins, const std::vector<std::string>& without) {
   Problem problem = given;
   Search out;
+  Field field;
   const auto all = available(problem, without);
+  const auto say = [&](std::string step) { out.steps.push_back(std::move(step)); };
+  fit_alone(problem, all, field);
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
-  for (int pass = 0; pass < (sparse_core ? 2 : 1); ++pass) {
-    Candidate base;
-    base.fit = pass == 0 ? fit(problem, {}) : fit(problem, {}, {&out.base.fit});
-    base.ratio = ratio_of(base.fit);
-    out.base = std::move(base);
-    out.singles = singles_of(problem, all, out.base, out.singles);
-    if (pass == 0 && sparse_core && !out.singles.empty()) {
-      refine_core_noise(problem, out.singles.front().gain > 0 ? out.singles.front().fit : out.base.fit);
-    }
+  if (sparse_core && !field.singles.empty()) {
+    refine_core_noise(problem, field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit);
+    fit_alone(problem, all, field);
   }
-  out.chosen = out.base;
-  out.steps.push_back(
-      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
-  const bool detected = !out.singles.empty() && out.singles.front().gain > margins.detect;
-  const double first_moves = detected ? moved_K(problem, out.singles.front().fit, out.base.fit) : 0;
-  if (!detected || (first_moves < margins.noticeable_K && out.base.ratio < margins.adequate_ratio)) {
-    out.verdict = out.base.ratio < margins.adequate_ratio ? Verdict::adequate : Verdict::unknown_cause;
-    out.steps.push_back(
-        detected
+  out.base = out.chosen = field.base;
+  out.singles = field.singles;
+  say(fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
+
+  // Is anything missing?
+  const Disturbance without_causes = disturbance_of(problem, out.base.fit);
+  const double gain = field.singles.empty() ? 0 : field.singles.front().gain;
+  const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
+  const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
+  const bool disturbed =
+      without_causes.gain > margins.remains && without_causes.noise.housing_slow_K > margins.noticeable_K;
+  if (gain <= margins.detect || (moves < margins.noticeable_K && !disturbed)) {
+    out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
+    say(gain > margins.detect
             ? fmt::format(
-                  "{} gains {:.1f} in evidence, but moves no temperature by more than {:.2f} K rms: not worth a name.",
-                  listed(out.singles.front().fit.chosen), out.singles.front().gain, first_moves)
+                  "{} gains {:.1f} in evidence, but moves no temperature by more than {:.2f} K rms: not worth a "
+                  "name.",
+                  first, gain, moves)
             : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
-                          margins.detect, out.singles.empty() ? "none" : listed(out.singles.front().fit.chosen),
-                          out.singles.empty() ? 0.0 : out.singles.front().gain));
+                          margins.detect, first, gain));
+    if (disturbed)
+      say(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.", without_causes.noise.housing_slow_K,
+                      without_causes.gain));
     return out;
   }
 
-  out.sets = out.singles;
-  std::vector<Candidate> pairs = pairs_of(problem, out.base, out.singles);
-  // A second cause may only have helped the first out of a poor valley: each alone starts again from where the pair
-  // ended, and the pair must beat that.
-  for (std::size_t i = 0; i < std::min(beam, pairs.size()); ++i) {
-    for (Candidate& alone : out.sets) {
-      const auto& both = pairs[i].fit.chosen;
-      if (std::find(both.begin(), both.end(), alone.fit.chosen.front()) == both.end()) continue;
-      Fit again = fit(problem, alone.fit.chosen, {&pairs[i].fit});
-      if (again.x.size() > 0 && again.cost < alone.fit.cost) alone = candidate(out.base, std::move(again));
-    }
+  // Where even the best leaves a disturbance, all are judged again with that counted as noise: a model that is known to
+  // be off cannot rank causes by what is smaller than its error.
+  fit_pairs(problem, field);
+  const auto& leader = field.pairs.empty() || field.pairs.front().gain < field.singles.front().gain + margins.second
+                           ? field.singles.front()
+                           : field.pairs.front();
+  const Disturbance left_by_leader = disturbance_of(problem, leader.fit);
+  Problem judged = problem;
+  if (left_by_leader.gain > margins.remains) {
+    judged.noise = left_by_leader.noise;
+    say(fmt::format("Even the best set, {}, leaves a slow disturbance of {:.2f} K, which from here on counts as noise.",
+                    listed(leader.fit.chosen), judged.noise.housing_slow_K));
+    fit_alone(judged, all, field);
+    fit_pairs(judged, field);
   }
-  sort(out.sets);
-  if (const std::string refusal = why_no_pair(problem, pairs, out.sets.front(), margins); refusal.empty()) {
-    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pairs.front().fit.chosen),
-                                    pairs.front().gain, pairs.front().gain - out.sets.front().gain,
-                                    listed(out.sets.front().fit.chosen)));
-    out.sets = std::move(pairs);
+
+  // One cause or two?
+  const std::string refusal = why_no_pair(judged, field, margins);
+  if (refusal.empty()) {
+    say(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(field.pairs.front().fit.chosen),
+                    field.pairs.front().gain, field.pairs.front().gain - field.singles.front().gain,
+                    listed(field.singles.front().fit.chosen)));
+    out.sets = std::move(field.pairs);
   } else {
-    out.steps.push_back(refusal);
+    say(refusal);
+    out.sets = std::move(field.singles);
   }
   out.sets.front().chosen = true;
   out.chosen = out.sets.front();
-  const std::vector<std::string> best_ids = ids_of(out.chosen.fit.chosen);
-  out.tied.push_back(best_ids);
-  // Where even the best is not adequate, sets that explain the same to one part in a hundred cannot be ranked at all.
-  const double blunt = bluntness(problem, out.chosen, margins.adequate_ratio);
-  const double tie = blunt > 1 ? std::max(margins.tie * blunt, 0.01 * out.chosen.gain) : margins.tie;
+  const bool single = out.chosen.fit.chosen.size() == 1;
+  const std::string best = listed(out.chosen.fit.chosen);
+
+  // What does the best leave, and does it explain more than a disturbance without a name would?
+  const Disturbance left = disturbance_of(problem, fit(problem, out.chosen.fit.chosen, {&out.chosen.fit}));
+  const double explains = left.evidence - without_causes.evidence;
+  const bool complete = left.gain < margins.remains;
+  const Rmse missed = rmse_of(problem, out.base.fit);
+  const double before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
+  const double after_K = left.noise.housing_slow_K;
+  const bool mostly = (single && explains > margins.dominance * left.gain) || after_K < margins.small_part * before_K;
+  const std::string remains = fmt::format(
+      "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
+      "gains {:.1f}",
+      before_K, after_K, left.gain, explains);
+  // Which sets are as good? What is left over may belong to any of them.
+  const double tie = complete ? margins.tie : margins.tie + left.gain;
+  out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
     if (c.chosen || out.chosen.gain - c.gain >= tie) continue;
     const auto ids = ids_of(c.fit.chosen);
@@ -295,36 +360,21 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     c.tied = true;
     out.tied.push_back(ids);
   }
+  std::string ladder;
+  for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)
+    ladder += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
+  say("The best sets and their evidence: " + ladder + ".");
 
-  std::string best;
-  for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i) {
-    best += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
-  }
-  out.steps.push_back("The best sets and their evidence: " + best + ".");
-  const bool adequate = out.chosen.ratio < margins.adequate_ratio;
-  const bool mostly = out.chosen.explained > margins.explained_share;
-  // One cause far ahead of every other is named for what it is, the largest part, even if much remains.
-  const auto next_id = std::find_if(out.singles.begin(), out.singles.end(), [&](const Candidate& c) {
-    return ids_of(c.fit.chosen) != ids_of(out.singles.front().fit.chosen);
-  });
-  const bool dominant = out.chosen.fit.chosen.size() == 1 && out.chosen.explained > 0.5 &&
-                        (next_id == out.singles.end() || out.chosen.gain > margins.dominance * next_id->gain);
-  const std::string remains =
-      fmt::format("the residual is {:.2f} times the noise, {:.0f} % of the misfit are explained", out.chosen.ratio,
-                  100 * out.chosen.explained);
-  if (!adequate && !mostly && !dominant) {
+  if (explains < margins.detect || (!complete && !mostly)) {
     out.verdict = Verdict::unknown_cause;
-    out.steps.push_back("With the best, " + listed(out.chosen.fit.chosen) + ", " + remains +
-                        ": none of the known causes explains this.");
-  } else if (out.tied.size() > 1 && !(dominant && !adequate)) {
+    say(fmt::format("The best is {}, but {}: none of the known causes explains this.", best, remains));
+  } else if (out.tied.size() > 1) {
     out.verdict = Verdict::ambiguous;
-    out.steps.push_back(
-        fmt::format("{} other sets of causes come within {:.0f}: they cannot be told apart with this data; {}.",
+    say(fmt::format("{} other sets of causes come within {:.0f}: they cannot be told apart with this data; {}.",
                     out.tied.size() - 1, tie, remains));
   } else {
-    out.tied.resize(1);
-    out.verdict = adequate ? Verdict::explained : Verdict::partly_explained;
-    out.steps.push_back(fmt::format("No other set comes within {:.0f}; {}.", tie, remains));
+    out.verdict = complete ? Verdict::explained : Verdict::partly_explained;
+    say(fmt::format("No other set comes within {:.0f}; {}.", margins.tie, remains));
   }
   return out;
 }
