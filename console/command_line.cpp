@@ -62,6 +62,9 @@ int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {
   } catch (const UserError& error) {
     if (error.exit_code() == static_cast<int>(Exit::gone)) console.hang_up();
     failed(error.what(), error.exit_code());
+  } catch (const std::exception& error) {
+    failed(fmt::format("hotcore stopped: {}. This is a fault of the program; please report the command.", error.what()),
+           static_cast<int>(Exit::unusable));
   }
   return code;
 }

@@ -109,4 +109,33 @@ Values parameters_of_model(const std::string& path, std::string& why) {
   return found;
 }
 
+Offer offer(const nlohmann::json& answer, const std::string& model_path, double housing_noise_K) {
+  Offer offer;
+  std::string why;
+  offer.values = parameters_of_model(model_path, why);
+  if (offer.values.empty()) {
+    const auto miss = !answer.is_object() ? nlohmann::json()
+                                          : answer.value("/baseline/rmse_K/housing"_json_pointer, nlohmann::json());
+    if (!miss.is_number() || miss.get<double>() > housing_noise_K) {
+      offer.note = fmt::format("the model has {}, which this board's parameters cannot express", why);
+      return offer;
+    }
+    for (const auto& line : answer.value("/baseline/parameters"_json_pointer, nlohmann::json::array())) {
+      const std::string name = line.value("name", std::string());
+      const bool sure = line.value("determined", false) && !line.value("at_bound", true);
+      if (sure && name == "R2") offer.values["R2_K_per_W"] = line.value("value", NAN);
+      if (sure && name == "C2") offer.values["C2_J_per_K"] = line.value("value", NAN);
+    }
+    offer.note = fmt::format(
+        "The board cannot express {}, but without it the housing is missed by {:.2f} K only, less than housing_noise_K",
+        why, miss.get<double>());
+  } else {
+    offer.note = "The board can express all of it";
+  }
+  offer.values.erase("R1_K_per_W");
+  offer.values.erase("C1_J_per_K");
+  offer.note += "; R1 and C1 stay: a housing sensor alone does not tell the winding well enough";
+  return offer;
+}
+
 }  // namespace console

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -28,5 +29,18 @@ std::string sheet_of(const Values& values, const std::string& name);
 /// Parameters that the model file of identify (--write-model) comes to on this board; empty if the model has something
 /// that they cannot express, and `why` says what.
 Values parameters_of_model(const std::string& path, std::string& why);
+
+/// What is offered to be written, and a sentence that says why not more.
+struct Offer {
+  Values values;
+  std::string note;
+};
+
+/// From identify's answer (JSON) and model file. A housing sensor alone tells the winding's R1 and C1 only through a
+/// housing that hardly feels them: a small effect outside the model moves them by tens of percent, to the cold side as
+/// well, so they are never offered. If the model found has more than parameters can express, R2 and C2 of the plain
+/// two-resistor fit are, provided that it misses the housing by less than `housing_noise_K`, which the board grants
+/// anyway.
+Offer offer(const nlohmann::json& answer, const std::string& model_path, double housing_noise_K);
 
 }  // namespace console

@@ -117,13 +117,14 @@ void identify(Console& console, const Arguments& a) {
 
   std::ifstream in(json);
   const auto answer = nlohmann::json::parse(in, nullptr, false);
-  const std::string sentence = answer.is_object() ? answer.value("sentence", std::string()) : "";
-  std::string why;
-  Values found = parameters_of_model(model, why);
+  if (!answer.is_object())
+    throw UserError(Exit::unusable, json + ": identify left no answer there; run it on the log by hand.");
+  const std::string sentence = answer.value("sentence", std::string());
+  const Offer offered = offer(answer, model, double{before.at("housing_noise_K")});
   std::string text = sentence + "\n";
   Json changes = Json::object();
   std::vector<Assignment> assignments;
-  for (const auto& [name, value] : found) {
+  for (const auto& [name, value] : offered.values) {
     const auto old = before.find(name);
     if (old == before.end() || old->second == value) continue;
     const Target target = session.parameters().named(fmt::format("axis{}.{}", axis, name)).front();
@@ -136,10 +137,12 @@ void identify(Console& console, const Arguments& a) {
                  {"model", model},       {"report", a.out + "/report.html"},
                  {"written", false},     {"saved", false}};
   text += fmt::format("Log, model and report: {}\n", a.out);
-  if (found.empty()) {
-    text += fmt::format("Nothing was written: the model has {}, which this board's parameters cannot express.\n", why);
+  result["note"] = offered.note;
+  if (offered.values.empty()) {
+    text += fmt::format("Nothing was written: {}.\n", offered.note);
     return console.say(text, result);
   }
+  text += offered.note + ".\n";
   for (const Assignment& assignment : assignments) check(assignment, "identify found ");
   if (!console.options.json) fmt::print("{}", text);
   if (!assignments.empty() && agreed(console, a)) {

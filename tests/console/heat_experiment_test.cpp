@@ -104,4 +104,33 @@ TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
   refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n", "gain");
 }
 
+nlohmann::json answer(double miss_K, bool determined) {
+  const auto line = [&](const char* name, double value) {
+    return nlohmann::json{{"name", name}, {"value", value}, {"determined", determined}, {"at_bound", false}};
+  };
+  return {{"baseline",
+           {{"rmse_K", {{"housing", miss_K}, {"core", nullptr}}},
+            {"parameters", {line("R1", 0.6), line("R2", 16.6), line("C1", 1.7), line("C2", 16.8)}}}}};
+}
+
+TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
+  const auto offered = console::offer(answer(0.1, true), file("model.toml", two_resistors), 0.5);
+  const console::Values expected = {{"C2_J_per_K", 20.0f},
+                                    {"R2_K_per_W", 10.0f},
+                                    {"copper_coefficient_per_K", 0.004f},
+                                    {"housing_lag_s", 0.0f},
+                                    {"housing_offset_K", 0.0f}};
+  EXPECT_EQ(offered.values, expected);
+}
+
+TEST(HeatExperiment, BeyondTheBoardsModelOnlyASmallMissIsForgiven) {
+  const std::string model =
+      file("model.toml", two_resistors + "[[source]]\nnode = 1\ndrive = \"speed_rad_per_s\"\ngain = 0.1\n");
+  const console::Values housing = {{"C2_J_per_K", 16.8f}, {"R2_K_per_W", 16.6f}};
+  EXPECT_EQ(console::offer(answer(0.18, true), model, 0.5).values, housing);
+  EXPECT_TRUE(console::offer(answer(0.18, false), model, 0.5).values.empty());
+  EXPECT_TRUE(console::offer(answer(0.9, true), model, 0.5).values.empty());
+  EXPECT_TRUE(console::offer(nlohmann::json(), model, 0.5).values.empty());
+}
+
 }  // namespace

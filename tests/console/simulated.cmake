@@ -50,7 +50,7 @@ expect(identify_reads_the_log 0 "Verdict: " ${IDENTIFY} x.csv --motor ec-16-40w)
 set(typed "set axis0.current_limit_A=7\nget axis0.current_limit_A\nbogus\nrun \"3A 0.1s\"\nquit\n")
 expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
 set(typed "")
-expect(identification 0 "Log, model and report: found" ${sim} identify --minutes 6 --out found --yes)
+expect(identification 0 "axis0.R2_K_per_W +16.3 -> 1[567].*In force until" ${sim} identify --minutes 6 --out found --yes)
 
 if(failures)
   list(JOIN failures "\n  " text)
