@@ -39,7 +39,7 @@ class Transfers {
   /// moved) and some 50 us a packet.
   void turn(std::vector<Transfer>& finished);
   /// Submits and waits, for tests and enumeration. What else finishes meanwhile is kept for the next `turn`.
-  Transfer wait_for(Transfer transfer, double patience_s = 1.0);
+  Transfer wait_for(Transfer transfer, double patience_s = 0.3);
   Transfer control(std::uint8_t type, std::uint8_t request, std::uint16_t value, std::uint16_t index,
                    std::uint16_t length, std::vector<std::uint8_t> data = {});
 
