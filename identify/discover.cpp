@@ -123,6 +123,17 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   return "";
 }
 
+/// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
+/// times the rating, an ordinary overload for seconds.
+double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& motor) {
+  double square = 0;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) square = std::max(square, bin.input[thermal::Drive::current_A2]);
+  }
+  const double rated_A = motor ? motor->motor.rated_current_A * 2 / std::sqrt(3.0) : 0;
+  return std::max(std::sqrt(square), 3 * rated_A);
+}
+
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
@@ -247,7 +258,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
       add_extended(problem, found.chosen.fit, report, 0);
       if (report.core_refusal.empty()) report.gain = gain_of(problem, two, found.chosen.fit);
     }
-    report.experiment = experiment(problem, found);
+    report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);
   }
   if (held.fraction > 0 || !held.logs.empty())

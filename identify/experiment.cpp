@@ -129,7 +129,7 @@ double fill(Problem& trial, const Fit& truth) {
 
 }  // namespace
 
-std::optional<Experiment> experiment(const Problem& problem, const Search& found) {
+std::optional<Experiment> experiment(const Problem& problem, const Search& found, double most_A) {
   if (found.verdict != Verdict::ambiguous || problem.heated_by_power()) return std::nullopt;
   std::vector<const Candidate*> tied;
   for (const Candidate& c : found.sets) {
@@ -149,23 +149,28 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     const bool turns = std::any_of(protocol.steps.begin(), protocol.steps.end(),
                                    [](const ProfileStep& s) { return s.speed_rad_per_s != 0; });
     if (turns && top <= 0) continue;
-    double least = 1e300, amps = problem.rms_A;
+    double largest = 0;
+    for (const ProfileStep& step : protocol.steps) largest = std::max(largest, std::abs(step.current_A));
+    double least = 1e300, amps = std::min(problem.rms_A, most_A / largest);
+    bool cool = true;
     for (const Candidate* truth : tied) {
       Problem trial = problem;
       // The motor's own limit, with 10 K to spare, under every one of the models: identification must not burn what it
       // measures.
-      for (int i = 0; i < 12; ++i) {
+      cool = false;
+      for (int i = 0; i < 12 && !cool; ++i) {
         trial.logs = {bins_for(problem, protocol.steps, amps, top)};
-        if (fill(trial, truth->fit) < problem.belief.winding_max_degC - 10) break;
-        amps *= 0.88;
+        cool = fill(trial, truth->fit) < problem.belief.winding_max_degC - 10;
+        if (!cool) amps *= 0.88;
       }
+      if (!cool) break;
       for (const Candidate* rival : tied) {
         if (rival == truth) continue;
         const Fit f = fit(trial, rival->fit.chosen);
         least = std::min(least, 2 * f.misfit);
       }
     }
-    if (least > best_D) {
+    if (cool && least > best_D) {
       best_D = least;
       best.profile.clear();
       for (const ProfileStep& s : protocol.steps)
@@ -173,6 +178,7 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
       best.why = protocol.why;
     }
   }
+  if (best_D < 0) return std::nullopt;
   const char* chance = best_D < 3    ? "hardly a chance to tell them apart"
                        : best_D < 10 ? "perhaps half a chance"
                        : best_D < 20 ? "a fair chance"

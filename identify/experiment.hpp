@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Which experiment would tell tied causes apart? T-optimal design with refit: each tied model makes a noise-free log of
-// each protocol, every other tied model is fitted to it, and the protocol wins whose smallest remaining misfit is largest.
+// each protocol, every other tied model is fitted to it, and the protocol wins whose smallest remaining misfit is
+// largest.
 //
 // A misfit D (in squared noise units) of 20 gives a 90 % chance to name (measured on 8,736 logs; below 3: 3 %).
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "identify/report.hpp"
@@ -12,7 +14,9 @@
 
 namespace identify {
 
-/// Nothing when there is no tie, or when the log's heat input is a power (no current to ask for).
-std::optional<Experiment> experiment(const Problem& problem, const Search& found);
+/// Nothing when there is no tie, or when the log's heat input is a power (no current to ask for). Every tied model
+/// keeps the winding 10 K below its limit, and no step asks for more than `most_A` (amplitude).
+std::optional<Experiment> experiment(const Problem& problem, const Search& found,
+                                     double most_A = std::numeric_limits<double>::infinity());
 
 }  // namespace identify

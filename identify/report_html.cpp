@@ -157,7 +157,8 @@ std::string as_html(const Report& r) {
 
   if (!r.ladder.empty()) s += bars(r);
   for (const CauseLine& c : r.causes) {
-    s += fmt::format("<h2>Behaves like: {}</h2><p>{}. Evidence {:.1f}.</p><table>", escaped(c.id), escaped(c.name),
+    s += fmt::format("<h2>{}: {}</h2><p>{}. Evidence {:.1f}.</p><table>",
+                     r.verdict == "ambiguous" ? "May behave like" : "Behaves like", escaped(c.id), escaped(c.name),
                      c.delta_bic) +
          parameter_rows(c.parameters) + "</table>\n";
   }
@@ -168,6 +169,7 @@ std::string as_html(const Report& r) {
   };
   if (r.variants.empty()) errors("two-resistor model, fitted", r.baseline_rmse);
   for (const Variant& v : r.variants) errors("two-resistor model, " + v.what, v.rmse);
+  if (!r.causes.empty()) errors("extended model, fitted", r.extended_rmse);
   if (r.held_out) {
     for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i)
       errors("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);

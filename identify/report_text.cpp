@@ -108,7 +108,9 @@ std::string as_text(const Report& r, bool explain) {
     }
   }
   for (const CauseLine& c : r.causes) {
-    s += fmt::format("\nCause: {}\n  {}\n  evidence {:.1f}; seen by: {}\n", c.id, c.name, c.delta_bic, c.signature);
+    s += fmt::format("\n{}: {}\n  {}\n  evidence {:.1f}; seen by: {}\n",
+                     r.verdict == "ambiguous" ? "May behave like" : "Behaves like", c.id, c.name, c.delta_bic,
+                     c.signature);
     for (const ParameterLine& p : c.parameters) s += line_of(p);
     for (const Rival& rival : c.rivals) s += fmt::format("  rival: {} ({:+.1f})\n", rival.id, rival.delta_bic);
   }

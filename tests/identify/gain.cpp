@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
         "found puts {} of these right and spoils {} of the others\n",
         seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed);
   // What CI holds; the promise is 0.95, and how far it is kept is what this program prints.
-  constexpr double least_helped = 0.1, most_harmed = 0.8;
+  constexpr double least_helped = 0.4, most_harmed = 0.5;
   const bool holds =
       tests::plausible(helped, missed, least_helped) && tests::plausible(seeds - harmed, seeds, 1 - most_harmed);
   return check && !holds ? 1 : 0;

@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 #include <toml++/toml.h>
 
+#include <cmath>
 #include <filesystem>
 
+#include "identify/experiment.hpp"
 #include "identify/model_file.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/hidden_log.hpp"
@@ -84,6 +86,34 @@ TEST(Search, WithTheTrueCauseTakenOutOfTheTableItIsNotNamed) {
   ASSERT_TRUE(names(with));
   for (const auto& ids : without.tied) EXPECT_EQ(std::count(ids.begin(), ids.end(), "neighbour_heat"), 0);
   EXPECT_LT(without.chosen.gain, with.chosen.gain);
+}
+
+TEST(Experiment, StaysWithinTheMotorsLimits) {
+  const Hidden log = hidden({"radiation"}, 4242);
+  identify::Search tie;
+  tie.verdict = Verdict::ambiguous;
+  for (const char* id : {"radiation", "natural_convection"}) {
+    identify::Candidate c;
+    c.fit = identify::fit(log.problem, {{identify::cause_named(id), -1}});
+    c.tied = true;
+    tie.sets.push_back(c);
+  }
+  const auto largest_A = [&](double most_A) {
+    const auto advice = identify::experiment(log.problem, tie, most_A);
+    double largest = 0;
+    if (advice) {
+      for (const auto& step : advice->profile) largest = std::max(largest, std::abs(step.current_A));
+    }
+    return largest * 2 / std::sqrt(3.0);
+  };
+  const double hot = largest_A(1e9);
+  EXPECT_GT(hot, 0);
+  const double least = 0.5 * hot;
+  EXPECT_GT(largest_A(least), 0);
+  EXPECT_LE(largest_A(least), least * (1 + 1e-9));
+  Hidden cold = log;
+  cold.problem.belief.winding_max_degC = -50;
+  EXPECT_FALSE(identify::experiment(cold.problem, tie)) << "no current keeps a winding below an impossible limit";
 }
 
 TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
