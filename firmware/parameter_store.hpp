@@ -39,6 +39,10 @@ inline constexpr int parameter_count = static_cast<int>(sizeof(AxisSet) / sizeof
 class ParameterStore {
  public:
   static constexpr std::size_t slot_bytes = 1024;
+  // Payload: version, count, ids (two a word), values of axis 0, of axis 1.
+  static constexpr std::size_t id_words = (parameter_count + 1) / 2;
+  static constexpr std::size_t record_words = header_words + 2 + id_words + axis_count * parameter_count;
+  static_assert(record_words == 91 && 4 * record_words <= slot_bytes);
 
   explicit ParameterStore(const BoardRating& rating) : rating_(rating) {}
 
@@ -89,10 +93,6 @@ class ParameterStore {
   bool uncommitted() const;  // staged and in force differ
 
  private:
-  // Payload: version, count, ids (two a word), values of axis 0, of axis 1.
-  static constexpr std::size_t id_words = (parameter_count + 1) / 2;
-  static constexpr std::size_t record_words = header_words + 2 + id_words + axis_count * parameter_count;
-  static_assert(record_words == 91 && 4 * record_words <= slot_bytes);
   using Record = std::uint32_t[record_words];
   static constexpr std::uint32_t version = 1;
 
