@@ -236,6 +236,14 @@ TEST_F(Commands, ASilentBoardIsGivenUp) {
   EXPECT_EQ(say("get").code, 0);  // the next command looks anew
 }
 
+TEST_F(Commands, AnAnswerThatComesTooLateIsNotTakenForTheNext) {
+  console::Session session(std::make_unique<FakeTransport>(board_));
+  board_->late = Kind::state;
+  EXPECT_THROW((void)session.state(), wire::pc::UserError);
+  board_->temperature_degC = 99.0f;
+  EXPECT_EQ(session.state().axis[0].core_degC, 99.0f);
+}
+
 TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
   int gets = 0;
   board_->before = [&](Kind kind) { return kind != Kind::get || !(board_->unplugged = ++gets == 1); };
@@ -253,6 +261,7 @@ TEST_F(Commands, ABackupKeepsTheOldFileWhenItFails) {
 TEST_F(Commands, ABoardThatGoesAwayWhileLoggingLeavesTheRowsUntilThen) {
   board_->twist = [&](Kind kind, std::vector<std::uint8_t>&) {
     if (kind == Kind::telemetry && board_->now_s > 1.0) board_->unplugged = true;
+    EXPECT_FALSE(std::filesystem::exists(path("x.csv")));  // not under its name before its end
   };
   const Said said = say("log --out " + path("x.csv") + " --seconds 5 --rate 50");
   EXPECT_EQ(said.code, 7) << said.err;

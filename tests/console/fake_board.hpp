@@ -53,6 +53,9 @@ struct FakeBoard {
   /// May change an answer's payload before it is framed.
   std::function<void(wire::Kind, std::vector<std::uint8_t>&)> twist = [](wire::Kind, std::vector<std::uint8_t>&) {};
 
+  /// Holds back one answer of this kind until the next one of it, and sends both then.
+  wire::Kind late{};
+
   FakeBoard() {
     for (const Parameter& p : parameters) {
       for (std::uint8_t a = 0; a < p.axes; ++a)
@@ -277,9 +280,20 @@ struct FakeBoard {
         return refuse(frame);
     }
     twist(kind, payload);
-    if (!unplugged) send(wire::reply_to(kind), frame.sequence, payload);
+    if (unplugged) return;
+    if (late == kind) {
+      late = {};
+      held_ = {wire::reply_to(kind), frame.sequence, payload};
+      return;
+    }
+    if (held_.kind == wire::reply_to(kind)) send(held_.kind, held_.sequence, held_.payload);
+    send(wire::reply_to(kind), frame.sequence, payload);
   }
 
+  struct Held {
+    std::uint8_t kind = 0, sequence = 0;
+    Bytes payload;
+  } held_;
   float asked_A_[wire::axis_count]{};
   std::vector<wire::SignalAddress> watched_;
   std::uint16_t decimation_ = 1;
