@@ -19,7 +19,7 @@ vmlinuz=$(ls "$kernel"/boot/vmlinuz-* 2>/dev/null | head -1) || true
 [ -f "$image" ] || missing "no flash image $image (cmake --preset h8-15d && cmake --build --preset h8-15d)"
 
 work=$(mktemp -d)
-trap 'kill $server 2>/dev/null; rm -rf "$work"' EXIT
+trap 'kill $server 2>/dev/null || true; rm -rf "$work"' EXIT
 root=$work/root
 mkdir -p "$root"/{bin,dev,proc,sys,tmp,modules}
 cp "$here/init" "$here/scenario" "$root/"
