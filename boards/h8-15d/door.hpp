@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The debugger's door: a plain struct in RAM (symbol `door`) by which a debug probe commands and watches both axes. It
-// is how this image is driven until the USB device exists; whoever holds a probe could write any register anyway. The
-// same rules hold as for every host: setpoints age, arming is refused for its reasons, faults latch.
+// stays for tests and for boards whose USB is dead; whoever holds a probe could write any register anyway. The
+// same rules hold as for every host: setpoints age, arming is refused for its reasons, faults latch. Not beside USB: the
+// two are different contexts, and nothing keeps them apart.
 #pragma once
 
 #include <cstdint>
