@@ -601,6 +601,15 @@ TEST_F(Linked, TheTextPortAnswersInPlainLines) {
   EXPECT_EQ(type("disarm 1\n"), "ok\r\n");
   board.advance(2);
   EXPECT_EQ(axis(1).mode(), firmware::Mode::off);
+  for (const char* bad : {"iq 1 1.2.3\n", "iq 1 -\n", "iq 1 .\n", "iq 1\n", "iq  1  1e3\n"})
+    EXPECT_EQ(type(bad), "give amperes, such as: iq 0 1.5\r\n") << bad;
+  EXPECT_EQ(type("iq 1 99999\n").substr(0, 12), "the setpoint");
+  for (const char* bad : {"arm\n", "arm x\n", "arm 10\n"}) EXPECT_EQ(type(bad), "name axis 0 or 1\r\n") << bad;
+  EXPECT_EQ(type("\r\n \n").substr(0, 7), "unknown") << "an empty line says nothing, one of blanks is no command";
+  axis(0).hold({wire::Fault::over_current, 0, 40.0f, 28.0f, 0.0f});
+  EXPECT_NE(type("state\n").find("axis 0: tripped"), std::string::npos);
+  EXPECT_NE(type("state\n").find("a phase current passed the trip level"), std::string::npos);
+  EXPECT_NE(type("arm 0\n").find("read the fault"), std::string::npos);
   EXPECT_NE(type("clear 7\narm 0\n").find("name axis"), std::string::npos);
 }
 
