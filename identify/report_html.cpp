@@ -86,8 +86,10 @@ std::string picture(const Report& r, std::size_t l) {
     if (static_cast<std::size_t>(w.log) != l) continue;
     const bool winding = w.channel == "winding";
     if (winding != any(p.measured_core)) continue;  // one channel's stretches: two layers of tint hide each other
+    // A label is as wide as a tenth of the picture: on a narrower stretch it would run into its neighbour.
+    const bool wide = w.to_s - w.from_s > 0.09 * p.time_s.back();
     residual.stretches.push_back(
-        {w.from_s, w.to_s, fmt::format("{:+.1f} K", w.mean_K), w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
+        {w.from_s, w.to_s, wide ? fmt::format("{:+.1f} K", w.mean_K) : "", w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
     temperatures.stretches.push_back({w.from_s, w.to_s, "", w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
   }
   out.panels = {temperatures, residual, {p.heat_label, {{"", p.time_s, p.heat, "#404040"}}}};
