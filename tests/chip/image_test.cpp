@@ -216,6 +216,9 @@ TEST(Image, ASagOfTheLogicSupplyOpensTheGatesAndSavesTheHeat) {
   EXPECT_TRUE(pcb->chip.flash.peek(Flash::cr) >> 31) << "locked again, before the watchdog resets";
   pcb->run_for(0.001);
   EXPECT_EQ(pcb->chip.flash.words_programmed() - words, h8_15d::HeatKeeper::record_words);
+  pcb->run_for(0.002);
+  EXPECT_EQ(pcb->chip.last_reset(), ResetCause::wwdg)
+      << "nobody feeds it any more: a supply that comes back starts anew";
   NO_TROUBLE(*pcb);
 }
 

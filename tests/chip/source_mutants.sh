@@ -98,7 +98,7 @@ for i in "${picked[@]}"; do
   if ! build_mutant "$i"; then
     grep -q 'static assertion failed' "$scratch/build.log" || { cat "$scratch/build.log"; wrong "${names[i]}: does not compile"; }
     verdict="the compiler, by a static_assert"
-  elif ! timeout 120 "$tests" --gtest_fail_fast --gtest_brief=1 --gtest_filter="$filter" >"$scratch/test.log" 2>&1; then
+  elif ! timeout 900 "$tests" --gtest_fail_fast --gtest_brief=1 --gtest_filter="$filter" >"$scratch/test.log" 2>&1; then
     verdict=$(sed -n 's/^\[  FAILED  \] \([^ ]*\) (.*/\1/p' "$scratch/test.log" | head -1)
     verdict="${verdict:-no answer in time}: $(grep -m1 -A1 -E '^(Expected|Value of|  Actual|Which is|examine)|^\S+:[0-9]+: Failure$' "$scratch/test.log" | tail -1)"
   fi
