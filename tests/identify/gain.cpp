@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
   app.add_option("--minutes", options.minutes, "of each log")->capture_default_str();
   app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
-  app.add_flag("--check", check, "end with an error when no motor is helped beyond bad luck, or most are harmed");
+  app.add_flag("--check", check, "end with an error when a motor that two resistors served well is spoilt");
   app.add_flag("--json", json, "the cases as JSON");
   CLI11_PARSE(app, argc, argv);
 
@@ -116,9 +116,5 @@ int main(int argc, char** argv) {
         "model "
         "found puts {} of these right and spoils {} of the others\n",
         seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed);
-  // What CI holds; the promise is 0.95, and how far it is kept is what this program prints.
-  constexpr double least_helped = 0.4, most_harmed = 0.5;
-  const bool holds =
-      tests::plausible(helped, missed, least_helped) && tests::plausible(seeds - harmed, seeds, 1 - most_harmed);
-  return check && !holds ? 1 : 0;
+  return check && harmed > 0 ? 1 : 0;
 }
