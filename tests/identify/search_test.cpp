@@ -116,6 +116,15 @@ TEST(Experiment, StaysWithinTheMotorsLimits) {
   EXPECT_FALSE(identify::experiment(cold.problem, tie)) << "no current keeps a winding below an impossible limit";
 }
 
+TEST(Search, AnEffectOutsideTheTableThatAPairImitatesIsCalledUnknown) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({"grease"}, 3436);
+  EXPECT_EQ(identify::search(log.problem).verdict, Verdict::unknown_cause);
+  identify::Margins blind;  // to what a set leaves: then the imitation is named
+  blind.remains = 1e9;
+  EXPECT_TRUE(names(identify::search(log.problem, blind)));
+}
+
 TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
   const Hidden log = hidden({"load_friction"}, 4242);
   const auto f = identify::fit(log.problem, {{identify::cause_named("load_friction"), -1}});
