@@ -227,8 +227,16 @@ void Application::slow_lane() {
   keeper_.keep(driver_.memory());
 }
 
+/// Setpoints, arming and parameters know one caller: USB waits while the door has something new.
 void Application::look_at_door() {
   const volatile Door& in = door;
+  if (in.serial == door_serial_ && in.order_serial == door_order_ && in.wish_serial == door_wish_) return;
+  hold_off(usb_irq);
+  obey_door(in);
+  let_in(usb_irq);
+}
+
+void Application::obey_door(const volatile Door& in) {
   if (in.serial != door_serial_) {
     door_serial_ = in.serial;
     for (int i = 0; i < 2; ++i) {
@@ -238,7 +246,7 @@ void Application::look_at_door() {
   }
   if (in.order_serial != door_order_) {
     door_order_ = in.order_serial;
-    door.order_answer = obey(door);
+    door.order_answer = obey_order(door);
     door.saved_serial = parameters_.saved_serial();
   }
   if (in.wish_serial == door_wish_) return;
@@ -260,7 +268,7 @@ void Application::look_at_door() {
   }
 }
 
-wire::Answer Application::obey(const Door& in) {
+wire::Answer Application::obey_order(const Door& in) {
   switch (in.order) {
     case order_get:
       return {static_cast<std::uint8_t>(parameters_.get(in.assignment.address, door.order_value))};

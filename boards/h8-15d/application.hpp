@@ -47,7 +47,8 @@ class Application {
   void slow_lane();
   void read_slow_channel();
   void look_at_door();
-  wire::Answer obey(const Door& order);
+  void obey_door(const volatile Door& in);
+  wire::Answer obey_order(const Door& in);
   void remember();
 
   FlashStore parameter_flash_{parameter_sectors};

@@ -111,7 +111,7 @@ void bring_up_interrupts(std::uint32_t core_Hz) {
   reg(system::aircr) = 0x05FA0300;  // PRIGROUP 3: all four bits preempt
   for (const Priority p : {pvd_irq, index0_irq, index1_irq, adc_irq, usb_irq}) {
     byte_reg(system::nvic_ipr + static_cast<std::uint32_t>(p.irq)) = static_cast<std::uint8_t>(p.level << 4);
-    reg(system::nvic_iser + 4 * static_cast<std::uint32_t>(p.irq / 32)) = bit(p.irq % 32);
+    let_in(p);
   }
   byte_reg(system::shpr3_systick) = systick_level << 4;
   reg(system::systick_rvr) = core_Hz / 1000 - 1;

@@ -28,6 +28,16 @@ void wait_for_supply();                // returns when the logic supply is above
 inline void feed_iwdg() { reg(iwdg::kr) = 0xAAAA; }                        // 21.4.1
 inline void feed_wwdg() { reg(wwdg::cr) = bit(7) | (0x3F + wwdg_steps); }  // 22.6.1: WDGA, T; ISR
 
+/// Until `let_in`, this interrupt waits; what raised it meanwhile is remembered (PM0214 4.3.3, 4.3.2).
+inline void hold_off(const Priority& p) {
+  reg(system::nvic_icer + 4 * static_cast<std::uint32_t>(p.irq / 32)) = bit(p.irq % 32);
+  asm volatile("dsb\nisb" ::: "memory");  // from the next instruction on, 4.3.11 there
+}
+inline void let_in(const Priority& p) {
+  asm volatile("" ::: "memory");
+  reg(system::nvic_iser + 4 * static_cast<std::uint32_t>(p.irq / 32)) = bit(p.irq % 32);
+}
+
 inline void write_pin(Pin p, bool high) {
   reg(gpio::base(p.port) + gpio::bsrr) = high ? bit(p.number) : bit(p.number + 16);
 }

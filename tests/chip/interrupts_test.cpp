@@ -3,17 +3,18 @@
 // instruction, and that the more urgent preempts the less urgent down to the deepest nesting there is. Waits are
 // instructions at one cycle each; silicon adds 12 cycles of entry and gives back the rest of a block.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <vector>
 
-#include "tests/chip/image.hpp"
+#include "tests/chip/plugged.hpp"
 
 namespace image_tests {
 namespace {
 
 using namespace host_sim::chip;
-constexpr int pvd = 16 + 1, index0 = 16 + 9, adc = 16 + 18, index1 = 16 + 23;
+constexpr int pvd = 16 + 1, index0 = 16 + 9, adc = 16 + 18, index1 = 16 + 23, usb = 16 + 67;
 
 double instructions(Time wait) { return to_s(wait) * 168e6; }
 
@@ -38,13 +39,25 @@ void in(boards::Pcb& pcb, double seconds, Happens happens) {
   pcb.chip.at(pcb.chip.now() + from_s(seconds), happens);
 }
 
-// Index pulses and millisecond ticks are laid over every phase of the fast lanes, supply and crystal fail in several.
+/// A program's traffic in turns: setpoints, a long answer, another.
+void talk(Plugged& p, int k) {
+  const wire::Setpoints wish{3, {}, {0, 0}, {4.0f, -4.0f}};
+  const wire::Index first{0};
+  const auto out = k % 3 == 0   ? encoded(wire::Kind::setpoint, 1, &wish, sizeof wish)
+                   : k % 3 == 1 ? encoded(wire::Kind::describe_parameter, 2, &first, sizeof first)
+                                : encoded(wire::Kind::hello, 3, nullptr, 0);
+  p.host.submit(bulk(false, out, 0, 1));
+  p.host.submit(bulk(true, {}, 512, 2));
+}
+
+// Index pulses, millisecond ticks and packets are laid over every phase of the fast lanes, supply and crystal fail in
+// several.
 TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
   NEEDS_IMAGE(image);
   std::map<int, LaneCount> seen;
   unsigned block = 0, slow_lane = 0;
   const auto look = [&](boards::Pcb& pcb) {
-    for (const int e : {int{nmi}, pvd, index0, index1, adc, int{systick}}) {
+    for (const int e : {int{nmi}, pvd, index0, index1, adc, usb, int{systick}}) {
       const LaneCount& lane = pcb.chip.core().lane(e);
       LaneCount& all = seen[e];
       all.calls += lane.calls;
@@ -57,7 +70,9 @@ TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
   Options o;
   o.locked = false;
   for (int phase = 0; phase < 8; ++phase) {
-    auto pcb = board(o);
+    Plugged p(o);
+    const auto& pcb = p.pcb;
+    ASSERT_TRUE(p.configure());
     ASSERT_TRUE(pcb->arm());
     hold(*pcb, 4.0f, -4.0f, 0.05);
     pcb->chip.core().clear_counts();
@@ -66,7 +81,10 @@ TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
       for (int k = 0; k < 800; ++k) {
         if (k % 100 == 0) hold(*pcb, 4.0f, -4.0f, 0.01);
         in(*pcb, 20e-6, [&] { index_edge(*pcb, k % 2); });
+        if (k % 4 == 1) talk(p, k / 4);
         if (k % 4 == 0) in(*pcb, 30e-6, [&] { pcb->chip.nvic.pend(systick); });
+        std::vector<Transfer> finished;
+        p.host.turn(finished);
         pcb->run_for(50.05e-6);
       }
       EXPECT_EQ(pcb->chip.troubles().count(), 0u) << pcb->chip.report_text();
@@ -87,12 +105,16 @@ TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
   };
   const auto own = [&](int e) { return static_cast<double>(seen[e].worst); };
   const double both_indices = own(index0) + own(index1), one = block;
+  double after_usb = one + both_indices + own(usb);  // and the fast lanes that come meanwhile, one every 25 us
+  for (int turn = 0; turn < 3; ++turn)
+    after_usb = one + both_indices + own(usb) + own(adc) * (1 + std::floor(after_usb / 4200));
   const Row rows[] = {{"CSS (NMI)", nmi, std::min(100.0, one)},
                       {"PVD, level 0", pvd, std::min(100.0, one)},
                       {"index 0, level 1", index0, std::min(200.0, one + own(index1))},
                       {"index 1, level 1", index1, std::min(200.0, one + own(index0))},
                       {"ADC, level 2", adc, std::min(250.0, one + both_indices)},
-                      {"SysTick, level 14", systick, std::min(2100.0, one + both_indices + own(adc))}};
+                      {"OTG_FS, level 8", usb, std::min(2100.0, one + both_indices + own(adc))},
+                      {"SysTick, level 14", systick, std::min(10e3, after_usb)}};
   std::printf("%-20s %8s %12s %12s %12s\n", "source", "entries", "waits, worst", "bound", "own, worst");
   for (const Row& row : rows) {
     const LaneCount& s = seen[row.exception];
@@ -101,7 +123,8 @@ TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
     EXPECT_LE(instructions(s.worst_wait), row.bound) << row.name;
   }
   std::printf("longest block %u, main loop with the slow lane %u instructions\n", block, slow_lane);
-  EXPECT_GT(instructions(seen[systick].worst_wait), 0.5 * own(adc)) << "the sweep must have met the fast lane";
+  EXPECT_GT(instructions(seen[usb].worst_wait), 0.5 * own(adc)) << "the sweep must have met the fast lane";
+  EXPECT_GT(instructions(seen[systick].worst_wait), 0.5 * own(usb)) << "and USB";
   EXPECT_GT(instructions(seen[adc].worst_wait), 0.0);
   EXPECT_LT(instructions(seen[index0].worst_wait) + own(index0), 257) << "one count at 1000 rad/s takes 1.53 us";
   EXPECT_GT(slow_lane, 10 * instructions(seen[adc].worst_wait)) << "the fast lane must preempt the slow lane";

@@ -3,6 +3,7 @@
 // and the power stage must not notice.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "tests/chip/plugged.hpp"
@@ -113,6 +114,48 @@ TEST(Usb, APulledCableEndsInZeroCurrentAndTheLinkComesBack) {
     p.ask(Kind::disarm, wire::Axes{3});
   }
   EXPECT_EQ(p.pcb->chip.resets(), 0);
+  NO_TROUBLE_ON_USB(p);
+}
+
+// Arming and setpoints know one caller at a time: the main loop looks at the door while USB waits, and only so long.
+TEST(Usb, ComesNeverBetweenTheStepsOfTheDoor) {
+  NEEDS_IMAGE(image);
+  constexpr int usb = 16 + 67;
+  Plugged p;
+  ASSERT_TRUE(p.configure());
+  auto& chip = p.pcb->chip;
+  const auto run_until = [&](auto happened) {
+    const double until_s = to_s(chip.now()) + 5e-3;
+    while (!happened() && to_s(chip.now()) < until_s) chip.run_for(10e-9);
+    return happened();
+  };
+  const auto arming = [&] { return p.pcb->door().answer[1]; };
+  const auto order = [&] { return static_cast<std::uint32_t>(p.pcb->door().order_answer.status); };
+  struct Case {
+    const char* function;  // where the main loop is when USB comes
+    std::function<void()> begin;
+    std::function<std::uint32_t()> answer;  // differs from the one before
+  };
+  const Case cases[] = {{"4Axis3arm", [&] { p.pcb->wish(1, h8_15d::wish_arm); }, arming},
+                        {"14ParameterStore5stage",
+                         [&] {
+                           p.pcb->post(h8_15d::order_stage, {{0x0111, 0}, 1e9f});
+                         },
+                         order},
+                        {"14ParameterStore6commit", [&] { p.pcb->post(h8_15d::order_commit); }, order}};
+  for (const auto& [function, begin, answer] : cases) {
+    p.pcb->run_for(1.3e-3);
+    const std::uint32_t before = answer();
+    begin();
+    ASSERT_TRUE(run_until([&] {
+      return chip.nvic.running() == 0 && chip.function_at(chip.pc()).find(function) != std::string::npos;
+    })) << function;
+    ASSERT_EQ(answer(), before) << function;
+    chip.nvic.pend(usb);
+    ASSERT_TRUE(run_until([&] { return chip.nvic.running() == usb; })) << "served afterwards: " << function;
+    EXPECT_NE(answer(), before) << "USB came between the steps of " << function;
+  }
+  EXPECT_EQ(Plugged::as<wire::Hello>(p.ask(Kind::hello)).answer.status, 0);
   NO_TROUBLE_ON_USB(p);
 }
 
