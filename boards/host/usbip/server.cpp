@@ -296,7 +296,7 @@ int serve_until_interrupted(Device& device, std::uint16_t port) {
   const std::string where = server.port() == usbip_port ? "" : fmt::format("--tcp-port {} ", server.port());
   fmt::print(
       "A board is served on 127.0.0.1:{} (USB/IP). To attach it to this PC (package usbip, as root):\n"
-      "  modprobe vhci-hcd && usbip {}attach -r localhost -b {}\nCtrl-C pulls the cable and ends.\n",
+      "  modprobe vhci-hcd && usbip {}attach -r 127.0.0.1 -b {}\nCtrl-C pulls the cable and ends.\n",
       server.port(), where, bus_id);
   std::fflush(stdout);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
