@@ -50,11 +50,13 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
   take_over();
 }
 
-void Axis::configure(const AxisSetup& setup) {
-  const thermal::HeatMemory heat = core_.save();
-  new (&core_) thermal::CoreEstimator(usable_or_nothing(setup.heat), setup.estimator);  // too large for the stack
-  core_.restore(heat, 0.0);
-  senses_housing_ = setup.senses_housing;
+void Axis::configure(const AxisSetup& setup, HeatModel heat) {
+  if (heat == HeatModel::changed) {
+    const thermal::HeatMemory memory = core_.save();
+    new (&core_) thermal::CoreEstimator(usable_or_nothing(setup.heat), setup.estimator);  // too large for the stack
+    core_.restore(memory, 0.0);
+    senses_housing_ = setup.senses_housing;
+  }
   allowance_ = {0.0f, wire::Limit::thermal_late};
   judge(setup);
   post(Command::configure);

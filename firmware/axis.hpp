@@ -78,14 +78,19 @@ struct AxisState {
 /// The governor's settings on this board.
 thermal::GovernorSettings governor_settings(const BoardRating& rating);
 
+/// What another set makes of the heat model.
+enum class HeatModel : std::uint8_t { unchanged, changed };
+
 class Axis {
  public:
   Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating);
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
 
-  /// Another set for a disarmed axis. The temperatures stay; the fast lane takes it over at its next tick.
-  void configure(const AxisSetup& setup);
+  /// Another set for a disarmed axis; the fast lane takes it over at its next tick. With the heat model it had, the
+  /// estimate goes on as it was. With another one the temperatures stay, but none is below the ambient believed: what
+  /// the old model had learned of its surroundings proves nothing about the new one.
+  void configure(const AxisSetup& setup, HeatModel heat);
   /// Off or tripped, and nothing posted that could change that.
   bool at_rest() const;
 

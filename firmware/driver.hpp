@@ -33,7 +33,7 @@ class Driver {
   /// Both axes off or tripped, and nothing posted that could change that.
   bool at_rest() const { return axes_[0].at_rest() && axes_[1].at_rest(); }
   /// Another set for a disarmed axis.
-  void configure(int index, const AxisSetup& setup) { axes_[index].configure(setup); }
+  void configure(int index, const AxisSetup& setup, HeatModel heat) { axes_[index].configure(setup, heat); }
 
   /// What must survive a reset, as of the last slow tick.
   DriverMemory memory() const { return {{axes_[0].memory(), axes_[1].memory()}, board_heat_.used_ratio()}; }

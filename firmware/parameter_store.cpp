@@ -49,6 +49,14 @@ bool same(const ParameterSet& a, const ParameterSet& b) {
   return true;
 }
 
+/// All that setup_from makes a heat model of.
+bool same_heat(const AxisSet& a, const AxisSet& b) {
+  for (int i = drive_count; i < parameter_count; ++i) {
+    if (!same(field(a, i), field(b, i))) return false;
+  }
+  return same(a.drive.phase_resistance_ohm, b.drive.phase_resistance_ohm);
+}
+
 bool untouched(const AxisSet& set) {
   for (int i = 0; i < parameter_count; ++i) {
     if (!same(field(set, i), parameter_info(i)->fallback)) return false;
@@ -145,8 +153,11 @@ wire::Answer ParameterStore::commit(Driver& driver) {
   if (!driver.at_rest()) return refused(wire::Status::not_disarmed);
   const wire::Answer against = check(staged_, rating_);
   if (against.status != 0) return against;
+  for (int i = 0; i < axis_count; ++i) {
+    const AxisSet &old = in_force_.axes[i], &now = staged_.axes[i];
+    driver.configure(i, setup_from(now), same_heat(old, now) ? HeatModel::unchanged : HeatModel::changed);
+  }
   in_force_ = staged_;
-  for (int i = 0; i < axis_count; ++i) driver.configure(i, setup_from(in_force_.axes[i]));
   return {};
 }
 

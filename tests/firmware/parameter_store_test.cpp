@@ -194,6 +194,48 @@ TEST(ParameterStore, TheTemperaturesSurviveACommit) {
   EXPECT_NEAR(b.driver.axis(0).core().estimate().hottest_degC(), 120.0, 0.1);
 }
 
+/// In a room of 25 degC, which the housing proved though 40 degC are believed without it.
+TEST(ParameterStore, AnUnrelatedParameterTouchesNoEstimateAndAnotherModelIsBegunHot) {
+  const firmware::AxisSetup setup = firmware::setup_from(sheet_set());
+  struct Event {
+    std::uint16_t id;
+    float value;
+    bool heat;
+  };
+  for (const Event event : {Event{0x0111, 12.0f, false}, Event{0x0201, 0.25f, true}, Event{0x0101, 0.6f, true}}) {
+    Bench saved;
+    saved.put_in_force();
+    ASSERT_EQ(saved.store.save(saved.driver, saved.flash).status, 0);
+    ParameterStore store(bench::rating);
+    ASSERT_EQ(store.start(saved.flash).status, 0);
+    Driver driver({bench::rating, {setup, setup}});
+    std::uint32_t sequence = 0;
+    const auto live = [&](int slow_ticks) {
+      for (int i = 0; i < 200 * slow_ticks; ++i) {
+        ++sequence;
+        for (int a = 0; a < 2; ++a) (void)driver.axis(a).tick(bench::quiet_sample(sequence));
+        if (i % 200 == 199) driver.slow_tick({{25.0f, true}, 0.0f, true}, {{{25.0f, true}}, {{25.0f, true}}});
+      }
+    };
+    live(100);
+    const auto estimate = [&](int axis) { return driver.axis(axis).core().estimate(); };
+    const thermal::Estimate before[] = {estimate(0), estimate(1)};
+    ASSERT_LT(before[0].hottest_degC(), 26.0);
+
+    ASSERT_EQ(store.stage({{event.id, 0}, event.value}).status, 0);
+    ASSERT_EQ(store.commit(driver).status, 0);
+    EXPECT_EQ(estimate(1).hottest_degC(), before[1].hottest_degC()) << "of the other axis nothing was asked";
+    if (event.heat) {
+      EXPECT_GE(estimate(0).hottest_degC(), 40.0) << event.id;
+      continue;
+    }
+    EXPECT_EQ(estimate(0).hottest_degC(), before[0].hottest_degC());
+    EXPECT_EQ(estimate(0).sigma_K[0], before[0].sigma_K[0]);
+    live(1);
+    EXPECT_EQ(driver.axis(0).state().allowance_A, event.value);
+  }
+}
+
 TEST(ParameterStore, ASavedSetIsInForceAfterTheNextStart) {
   Bench b;
   b.put_in_force();
