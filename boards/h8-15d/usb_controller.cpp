@@ -48,10 +48,16 @@ void UsbController::set_up() {
   wait_until(grstctl, bit(31), true);  // AHBIDL
   reg(grstctl) = bit(0);               // CSRST
   wait_until(grstctl, bit(0), false);
-  reg(gusbcfg) = (reg(gusbcfg) & ~(0xFu << 10)) | bit(30) | 6u << 10;  // FDMOD; TRDT for AHB above 32 MHz
-  reg(gccfg) = bit(21);                                                // NOVBUSSENS, transceiver off
-  set(dctl, bit(1));                                                   // SDIS
-  set(dcfg, 3);                                                        // DSPD: full speed, internal PHY
+  wait_until(grstctl, bit(31), true);
+  set(gusbcfg, bit(30));  // FDMOD
+  reg(gccfg) = bit(21);   // NOVBUSSENS, transceiver off
+}
+
+/// What may be written in device mode only: TRDT (34.16.2), the registers of 34.16.4.
+void UsbController::prepare_device() {
+  reg(gusbcfg) = (reg(gusbcfg) & ~(0xFu << 10)) | 6u << 10;  // TRDT for AHB above 32 MHz, Table 204
+  set(dctl, bit(1));                                         // SDIS
+  set(dcfg, 3);                                              // DSPD: full speed, internal PHY
   reg(grxfsiz) = rx_words;
   reg(dieptxf0) = tx_words << 16 | rx_words;
   for (std::uint32_t n = 1; n < endpoints; ++n)
@@ -69,6 +75,7 @@ void UsbController::set_up() {
 
 void UsbController::connect(bool on) noexcept {
   if (on) {
+    prepare_device();
     set(gccfg, bit(16));  // PWRDWN = 1: transceiver on
     clear(dctl, bit(1));  // SDIS
   } else {
@@ -77,7 +84,8 @@ void UsbController::connect(bool on) noexcept {
   }
 }
 
-/// The core answers to the new address from the status stage on (34.17.5).
+/// To be written before the status packet is handed over, which the host still fetches at the old address: the core
+/// sees to that (34.17.5, SetAddress command).
 void UsbController::set_address(std::uint8_t address) noexcept {
   reg(dcfg) = (reg(dcfg) & ~(0x7Fu << 4)) | static_cast<std::uint32_t>(address & 0x7F) << 4;
 }

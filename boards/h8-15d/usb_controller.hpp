@@ -14,7 +14,7 @@ namespace h8_15d {
 
 class UsbController {
  public:
-  /// Clock, pins, FIFOs; not seen on the cable yet. `connect` must not follow within 25 ms (FDMOD, 34.16.2).
+  /// Clock, pins, core reset, device mode asked for; it holds 25 ms later (FDMOD, 34.16.2), and `connect` not before.
   void set_up();
 
   // hal::UsbPort
@@ -72,6 +72,7 @@ class UsbController {
   };
   Event next();
   Event next_of_endpoints();
+  void prepare_device();
   void take_from_fifo();
   void forget_bus();
   void disable_in(int n);

@@ -182,6 +182,9 @@ void OtgFs::on_write(std::uint32_t offset, std::uint32_t value) {
   if (std::abs(links_.usb_Hz() - 48e6) > 120e3) trouble("its 48 MHz clock is missing (PLLQ)", offset);
   if (host_.now() < core_reset_ends_) trouble("written while the core soft reset still runs", offset);
   if (offset != pcgcctl && (peek(pcgcctl) & 3)) trouble("written while PCGCCTL stops its clocks", offset);
+  if (!in_device_mode() && ((offset >= dcfg && offset < fifo_base && offset != pcgcctl) ||
+                            (offset == gusbcfg && ((value ^ peek(gusbcfg)) & 0xF << 10))))  // TRDT
+    trouble("written before device mode was forced for 25 ms (FDMOD)", offset);
   if (offset >= fifo_base) {
     push(static_cast<int>((offset - fifo_base) / 0x1000), value);
   } else if (offset >= in_base && offset < out_base + 0x80) {
@@ -270,6 +273,8 @@ void OtgFs::write_dctl(std::uint32_t value) {
   check_attach();
 }
 
+bool OtgFs::in_device_mode() const { return (peek(gusbcfg) & bit(30)) && host_.now() >= forced_at_ + force_time; }
+
 /// The pull-up on D+ follows PWRDWN (which means powered) and soft disconnect.
 void OtgFs::check_attach() {
   const bool up = (peek(gccfg) & bit(16)) && !(peek(dctl) & bit(1));
@@ -277,8 +282,7 @@ void OtgFs::check_attach() {
     if (!(peek(gccfg) & bit(21))) trouble("VBUS is sensed on PA9, which is TIM1's (NOVBUSSENS is 0)", gccfg);
     if (!links_.pins()) trouble("attached, but PA11 and PA12 are not OTG_FS's (AF10)", gccfg);
     if ((peek(dcfg) & 3) != 3) trouble("attached with DSPD other than full speed on the internal PHY", dcfg);
-    if (!(peek(gusbcfg) & bit(30)) || host_.now() < forced_at_ + force_time)
-      trouble("attached before device mode was forced for 25 ms (FDMOD)", gusbcfg);
+    if (!in_device_mode()) trouble("attached before device mode was forced for 25 ms (FDMOD)", gusbcfg);
     if (field(peek(gusbcfg), 10, 4) != 6) trouble("TRDT is not 6, as AHB clocks above 32 MHz need", gusbcfg);
     idle_since_ = host_.now();
   }

@@ -104,6 +104,7 @@ class OtgFs : public Device {
   std::uint32_t pop_status();
   void check_fifos(int n, std::uint32_t offset);
   void check_attach();
+  bool in_device_mode() const;
   std::uint32_t interrupts() const;
   std::uint32_t endpoint_interrupts() const;
   void update();  // the interrupt line

@@ -34,8 +34,10 @@ struct Otg : ::testing::Test {
     write(gpioa + 0x24, 10u << 12 | 10u << 16);
     write(gpioa + 0x00, read(gpioa) | 2u << 22 | 2u << 24);
   }
-  void prepare() {
-    write(otg + 0x00C, 0x00000A00u | 1u << 30 | 6u << 10);  // GUSBCFG: FDMOD, TRDT = 6
+  void prepare(double forced_s = 26e-3) {
+    write(otg + 0x00C, 0x00000A40u | 1u << 30);  // GUSBCFG: FDMOD
+    chip.run_for(forced_s);
+    write(otg + 0x00C, 0x00000040u | 1u << 30 | 6u << 10);  // TRDT = 6
     write(otg + 0x804, 2);                                  // DCTL: SDIS
     write(otg + 0x800, 0x02200003);                         // DCFG: full speed
     write(otg + 0x024, 128);
@@ -51,7 +53,6 @@ struct Otg : ::testing::Test {
   void come_up() {
     give_pins();
     prepare();
-    chip.run_for(26e-3);
     attach();
     chip.otg.plug();
     chip.otg.bus_reset();
@@ -122,7 +123,6 @@ TEST_F(Otg, AControlTransferAndBulkPacketsPassInSilenceWhenDoneRight) {
 TEST_F(Otg, HalfADriverIsNoDevice) {
   chip.otg.plug();
   prepare();
-  chip.run_for(26e-3);
   EXPECT_FALSE(chip.otg.attached()) << "soft disconnect";
   attach();
   EXPECT_TRUE(complains("PA11 and PA12 are not OTG_FS's"));
@@ -130,11 +130,15 @@ TEST_F(Otg, HalfADriverIsNoDevice) {
 
 TEST_F(Otg, ComingTooEarlyOrSensingTheWrongPinIsAMistake) {
   give_pins();
-  prepare();
+  prepare(24e-3);
+  for (const std::uint32_t of_device_mode : {otg + 0x00C, otg + 0x800}) {
+    chip.clear_troubles();
+    write(of_device_mode, read(of_device_mode) ^ 1u << 10);
+    EXPECT_TRUE(complains("before device mode was forced for 25 ms (FDMOD)")) << std::hex << of_device_mode;
+  }
   write(otg + 0x038, 1u << 16);
   write(otg + 0x804, 0);
   EXPECT_TRUE(complains("VBUS is sensed on PA9"));
-  EXPECT_TRUE(complains("FDMOD"));
 }
 
 TEST_F(Otg, WithoutIts48MHzItIsDeaf) {
