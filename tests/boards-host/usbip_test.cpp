@@ -30,7 +30,7 @@ class Toy final : public Device {
   bool attached() const override { return in_; }
   void bus_reset() override { address_ = 0; }
   Answer setup(unsigned address, const std::array<std::uint8_t, 8>& r) override {
-    if (address != address_) return {};
+    if (address != address_ || dead) return {};
     answer_.clear();
     stall_ = false;
     const std::size_t length = static_cast<std::size_t>(r[6] | r[7] << 8);
@@ -44,7 +44,7 @@ class Toy final : public Device {
     return {Answer::ack};
   }
   Answer out(unsigned address, int endpoint, bool, std::span<const std::uint8_t> bytes) override {
-    if (address != address_ || endpoint > 1) return {};
+    if (address != address_ || endpoint > 1 || dead) return {};
     if (endpoint == 1) {
       if (echo_.size() > 4096) return {Answer::nak};
       echo_.insert(echo_.end(), bytes.begin(), bytes.end());
@@ -52,7 +52,7 @@ class Toy final : public Device {
     return {Answer::ack};
   }
   Answer in(unsigned address, int endpoint) override {
-    if (address != address_ || endpoint > 1) return {};
+    if (address != address_ || endpoint > 1 || dead) return {};
     if (endpoint == 0) {
       if (stall_) return {Answer::stall};
       address_ = next_;
@@ -68,6 +68,8 @@ class Toy final : public Device {
     return a;
   }
   void run(double) override {}
+
+  std::atomic<bool> dead{false};  // silent from now on
 
  private:
   bool in_ = false, stall_ = false, toggle_ = false;
@@ -241,7 +243,18 @@ TEST_F(UsbIp, WhoBreaksTheProtocolIsCutOffAndNobodyElse) {
 }
 
 TEST_F(UsbIp, AbsurdLengthsEndpointsAndRepeatedNumbersEndTheConnection) {
-  const Bytes nonsense[] = {submit(1, 1, true, 0xFFFFFFFF), submit(1, 99, true, 64),
+  const Bytes nonsense[] = {submit(1, 1, true, 0xFFFFFFFF),
+                            submit(1, 99, true, 64),
+                            [] {
+                              Bytes b = submit(1, 1, true, 64);
+                              b[3] = 7;  // no such command
+                              return b;
+                            }(),
+                            [] {
+                              Bytes b = submit(1, 1, true, 64);
+                              b[15] = 2;  // neither in nor out
+                              return b;
+                            }(),
                             [] {
                               Bytes b = submit(1, 1, true, 64);
                               b[35] = 4;  // four isochronous packets
@@ -267,6 +280,53 @@ TEST_F(UsbIp, AControlTransferThatContradictsItselfStalls) {
   EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPIPE);
   c.say(submit(2, 0, false, 2, {0, 0}, {0x80, 6, 0, 1, 0, 0, 2, 0}));  // OUT that says IN
   EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPIPE);
+}
+
+TEST_F(UsbIp, AMessageMayComeInPieces) {
+  Client c(server.port());
+  const Bytes import = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'};
+  c.say(Bytes(import.begin(), import.begin() + 8));
+  usleep(5000);
+  c.say(Bytes(import.begin() + 8, import.end()));
+  c.say(Bytes(29));
+  EXPECT_EQ(c.hear(320).size(), 320u);
+  const Bytes command = submit(1, 1, false, 3, {1, 2, 3});
+  for (const std::uint8_t byte : command) {
+    c.say({byte});
+    usleep(200);
+  }
+  EXPECT_EQ(get(c.hear(48), 24), 3u);
+}
+
+TEST_F(UsbIp, AReadThatIsTooSmallForItsPacketSaysOverflow) {
+  Client c(server.port());
+  ASSERT_EQ(c.import(), 0u);
+  c.say(submit(1, 1, false, 3, {1, 2, 3}));
+  c.hear(48);
+  c.say(submit(2, 1, true, 2));
+  EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EOVERFLOW);
+}
+
+TEST_F(UsbIp, ADeviceThatFallsSilentIsAProtocolErrorAndNobodyImportsIt) {
+  {
+    Client c(server.port());
+    ASSERT_EQ(c.import(), 0u);
+    toy.dead = true;
+    c.say(submit(1, 1, true, 64));
+    EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPROTO);
+  }
+  std::uint32_t status = 2;
+  for (int i = 0; i < 200 && status == 2; ++i) {  // the server notices that the first client left
+    usleep(5000);
+    status = Client(server.port()).import();
+  }
+  EXPECT_EQ(status, 3u);
+}
+
+TEST_F(UsbIp, AFifthClientIsTurnedAway) {
+  Client four[4] = {Client(server.port()), Client(server.port()), Client(server.port()), Client(server.port())};
+  for (Client& c : four) EXPECT_EQ(c.import("9-9"), 1u);  // each of them was let in
+  EXPECT_TRUE(Client(server.port()).cut_off());
 }
 
 TEST_F(UsbIp, RandomBytesDoNotBringItDown) {
@@ -295,6 +355,17 @@ TEST(UsbIpServer, SaysThatItsPortIsTaken) {
     EXPECT_EQ(error.exit_code(), static_cast<int>(wire::pc::Exit::busy));
     EXPECT_NE(std::string(error.what()).find("is taken by another program: choose another with --port"),
               std::string::npos);
+  }
+}
+
+TEST(UsbIpServer, SaysThatTheBoardDoesNotAnswer) {
+  Toy toy;
+  toy.dead = true;
+  try {
+    Server server(toy, 0);
+    FAIL() << "it serves nothing";
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_EQ(error.exit_code(), static_cast<int>(wire::pc::Exit::no_board));
   }
 }
 

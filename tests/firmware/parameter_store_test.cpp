@@ -36,6 +36,7 @@ struct Flash {
     return true;
   }
   bool erase(int which) {
+    if (!erases) return false;
     ++erased;
     std::fill(cells[which].begin(), cells[which].end(), std::uint8_t{0xFF});
     return true;
@@ -45,6 +46,7 @@ struct Flash {
   int words_left = -1;  // negative: the power stays
   std::uint32_t tear = 0x5A5A5A5A;
   int erased = 0;
+  bool erases = true;
 };
 static_assert(hal::Store<Flash>);
 
@@ -312,6 +314,35 @@ TEST(ParameterStore, RoomIsMadeAtTheStartAndNeverInBetween) {
   EXPECT_EQ(b.flash.erased, 1);
   EXPECT_EQ(next.saved_serial(), 8u) << "the newest is never in the area that is erased";
   EXPECT_EQ(next.save(b.driver, b.flash).status, 0);
+}
+
+TEST(ParameterStore, TheNewestCountsWhereverItStandsAndAnEraseThatFailsLosesNothing) {
+  Bench b;
+  b.put_in_force();
+  while (b.store.save(b.driver, b.flash).status == 0) {
+  }
+  b.flash.erases = false;
+  ParameterStore stuck(bench::rating);
+  EXPECT_EQ(stuck.start(b.flash).status, 0);
+  EXPECT_EQ(stuck.saved_serial(), 8u);
+  EXPECT_EQ(stuck.save(b.driver, b.flash).status, code(Status::no_room));
+  b.flash.erases = true;
+  ParameterStore next(bench::rating);
+  EXPECT_EQ(next.start(b.flash).status, 0);
+  EXPECT_EQ(next.save(b.driver, b.flash).status, 0);  // before the older ones of the other area
+  ParameterStore last(bench::rating);
+  EXPECT_EQ(last.start(b.flash).status, 0);
+  EXPECT_EQ(last.saved_serial(), 9u);
+}
+
+TEST(ParameterStore, AStoreTooSmallForARecordHoldsNone) {
+  Bench b;
+  b.put_in_force();
+  Flash tiny(8);
+  ParameterStore next(bench::rating);
+  EXPECT_EQ(next.start(tiny).status, code(Status::nothing_saved));
+  EXPECT_EQ(next.saved_serial(), 0u);
+  EXPECT_EQ(b.store.save(b.driver, tiny).status, code(Status::no_room));
 }
 
 TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {

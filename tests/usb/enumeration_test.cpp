@@ -186,6 +186,7 @@ TEST_F(Enumeration, RefusesWhatIsNotOnTheWhitelist) {
       {0x81, 10, 0, 3, 1},       // interface
       {0x01, 11, 1, 0, 0},       // alternate setting
       {0x01, 11, 0, 3, 0},       // interface
+      {0x02, 3, 0, 0x0181, 0},   // endpoint with a high byte
       {0x21, 0x20, 0, 1, 8},     // length
       {0x21, 0x20, 0, 2, 7},     // interface
       {0x21, 0x22, 4, 1, 0},     // value
@@ -238,6 +239,28 @@ TEST_F(Enumeration, HaltAndItsEndSetTheToggleBack) {
   EXPECT_FALSE(packet.data1);
   ASSERT_TRUE(ask(0x01, 11, 0, 0, 0)) << "SET_INTERFACE";
   EXPECT_FALSE(board.bus().toggle(0x81));
+}
+
+TEST_F(Enumeration, BothPortsAreSetBackOnTheirOwn) {
+  configure();
+  for (const std::uint8_t endpoint : {std::uint8_t{1}, std::uint8_t{3}}) {
+    const std::uint16_t interface = endpoint == 0x01 ? 0 : 2;
+    ASSERT_EQ(board.bus().out(address, endpoint, false, Bytes{0}), Handshake::ack);
+    ASSERT_TRUE(ask(0x01, 11, 0, interface, 0));
+    EXPECT_FALSE(board.bus().toggle(endpoint));
+    EXPECT_EQ(board.bus().out(address, endpoint, false, Bytes{0}), Handshake::ack);
+  }
+  EXPECT_TRUE(ask(0x01, 11, 0, 1, 0)) << "the text port's control interface has nothing to set back";
+  EXPECT_TRUE(board.bus().toggle(0x01));
+}
+
+TEST_F(Enumeration, EndpointZeroNeverHaltsAndNothingIsAskedOfItInVain) {
+  configure();
+  EXPECT_TRUE(ask(0x02, 1, 0, 0x00, 0)) << "to end a halt that is none is no error";
+  EXPECT_TRUE(ask(0x02, 1, 0, 0x80, 0));
+  EXPECT_FALSE(ask(0x02, 3, 0, 0x80, 0));
+  EXPECT_EQ(ask(0x80, 6, 0x0100, 0, 0), Bytes{}) << "a descriptor of no bytes: 9.3.5, no data stage";
+  EXPECT_TRUE(ask(0x80, 6, 0x0100, 0, 0).has_value());
 }
 
 TEST_F(Enumeration, ABusResetEndsEverything) {

@@ -170,6 +170,16 @@ TEST_F(Linked, WhileAnErrandRunsNobodyArmsOrStages) {
   for (const int later : {2, 3, 4}) EXPECT_EQ(statuses[later], number(Status::busy)) << later;
 }
 
+TEST_F(Linked, TheAnswerToAnErrandIsNotGivenToTheNextSession) {
+  program.ask(Kind::commit);
+  for (int i = 0; i < 2; ++i) program.exchange();  // taken, and no time has passed
+  program = Program(board);
+  program.connect();
+  program.pass(100);
+  EXPECT_TRUE(program.frames().empty());
+  EXPECT_EQ(program.status(Kind::commit), 0) << "and the next errand is served";
+}
+
 TEST_F(Linked, ArmsAllOrNone) {
   VirtualBoard fresh(options());
   Program early(fresh);
@@ -611,6 +621,9 @@ TEST_F(Linked, TheTextPortAnswersInPlainLines) {
   EXPECT_NE(type("state\n").find("a phase current passed the trip level"), std::string::npos);
   EXPECT_NE(type("arm 0\n").find("read the fault"), std::string::npos);
   EXPECT_NE(type("clear 7\narm 0\n").find("name axis"), std::string::npos);
+  EXPECT_EQ(type("clear 0\n"), "ok\r\n");
+  board.advance(2);
+  EXPECT_NE(type("state\n").find("axis 0: off"), std::string::npos);
 }
 
 /// Pulled at any instant, the axis is without current after 100 ms and the ramp, and the link comes back.
