@@ -68,11 +68,13 @@ class Toy final : public Device {
     return a;
   }
   void run(double) override {}
+  void power_cycle() override { in_ = false; }
 
   std::atomic<bool> dead{false};  // silent from now on
 
  private:
-  bool in_ = false, stall_ = false, toggle_ = false;
+  std::atomic<bool> in_ = false;
+  bool stall_ = false, toggle_ = false;
   unsigned address_ = 0, next_ = 0;
   Bytes answer_;
   std::deque<std::uint8_t> echo_;
@@ -227,6 +229,16 @@ TEST_F(UsbIp, AClosedConnectionIsAPulledCableAndTheNextClientFindsACleanDevice) 
     ASSERT_EQ(status, 0u) << round;
     c.say(submit(1, 1, false, 3, {1, 2, 3}));  // left in the middle of it
   }
+}
+
+TEST_F(UsbIp, ADeviceThatLeavesTheBusClosesItsConnectionAndMayComeBack) {
+  Client c(server.port());
+  ASSERT_EQ(c.import(), 0u);
+  c.say(submit(1, 1, true, 64));
+  toy.power_cycle();
+  EXPECT_TRUE(c.cut_off());
+  Client again(server.port());
+  EXPECT_EQ(again.import(), 0u);
 }
 
 TEST_F(UsbIp, WhoBreaksTheProtocolIsCutOffAndNobodyElse) {

@@ -18,8 +18,8 @@ vmlinuz=$(ls "$kernel"/boot/vmlinuz-* 2>/dev/null | head -1) || true
 [ -x "$programs/hotcore" ] || missing "no program hotcore"
 [ -f "$image" ] || missing "no flash image $image (cmake --preset h8-15d && cmake --build --preset h8-15d)"
 
-work=$(mktemp -d)
-trap 'kill $server 2>/dev/null || true; rm -rf "$work"' EXIT
+work=$(mktemp -d) server="" guest=""
+trap 'kill $server $guest 2>/dev/null || true; rm -rf "$work"' EXIT
 root=$work/root
 mkdir -p "$root"/{bin,dev,proc,sys,tmp,modules}
 cp "$here/init" "$here/scenario" "$root/"
@@ -44,7 +44,12 @@ done
 
 timeout 100 qemu-system-x86_64 -accel tcg -m 256 -nographic -no-reboot -nodefaults -serial stdio \
   -kernel "$vmlinuz" -initrd "$work/initrd" -append "console=ttyS0 quiet panic=-1 mitigations=off hotcore_port=$port" \
-  -netdev user,id=n -device e1000,netdev=n,romfile= </dev/null 2>&1 | tr -d '\r' >"$work/console" || true
+  -netdev user,id=n -device e1000,netdev=n,romfile= </dev/null >"$work/said" 2>&1 &
+guest=$!
+while kill -0 $guest 2>/dev/null && ! grep -q '^GUEST: cut the power' "$work/said"; do sleep 0.2; done
+kill -HUP $server || true  # the scenario's wish
+wait $guest || true
+tr -d '\r' <"$work/said" >"$work/console"
 grep '^GUEST' "$work/console" || tail -20 "$work/console"
 kill -INT $server
 code=0

@@ -21,6 +21,10 @@ class Cable final : public usb::Device {
   }
   usb::Answer in(unsigned address, int endpoint) override { return of(pcb_.chip.otg.in(address, endpoint)); }
   void run(double seconds) override { pcb_.run_for(seconds); }
+  void power_cycle() override {
+    pcb_.chip.power_off();
+    pcb_.power_on();
+  }
 
  private:
   static usb::Answer of(host_sim::chip::UsbAnswer a) {

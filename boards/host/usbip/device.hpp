@@ -26,6 +26,7 @@ class Device {
   virtual Answer out(unsigned address, int endpoint, bool data1, std::span<const std::uint8_t> bytes) = 0;
   virtual Answer in(unsigned address, int endpoint) = 0;
   virtual void run(double seconds) = 0;
+  virtual void power_cycle() = 0;  // its supply goes and comes back; what it saved stays
 };
 
 }  // namespace boards::usb

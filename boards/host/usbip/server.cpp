@@ -100,6 +100,7 @@ void Server::serve(const std::function<bool()>& stop) {
       transfers_.turn(finished);
     for (const Transfer& t : finished) deliver(t);
     finished.clear();
+    part_if_device_left();
     // A device that is slower than this PC's clock falls behind for good and does not race to catch up.
     offset_s = std::min(offset_s, transfers_.time_s() - wall_s() + too_late_s);
     look_at_sockets(due ? 0 : 1);
@@ -142,6 +143,13 @@ void Server::leave(Client& client) {
     transfers_.forget();
   }
   close(client.socket);
+}
+
+void Server::part_if_device_left() {
+  const auto holder = std::find_if(clients_.begin(), clients_.end(), [](const Client& c) { return c.has_device; });
+  if (holder == clients_.end() || device_.attached()) return;
+  leave(*holder);
+  clients_.erase(holder);
 }
 
 bool Server::read_from(Client& client) {
@@ -288,7 +296,7 @@ void Server::deliver(const Transfer& t) {
 }
 
 namespace {
-volatile std::sig_atomic_t interrupted = 0;
+volatile std::sig_atomic_t interrupted = 0, power_cut = 0;
 }
 
 int serve_until_interrupted(Device& device, std::uint16_t port) {
@@ -300,7 +308,12 @@ int serve_until_interrupted(Device& device, std::uint16_t port) {
       server.port(), where, bus_id);
   std::fflush(stdout);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
-  server.serve([] { return interrupted != 0; });
+  std::signal(SIGHUP, [](int) { power_cut = 1; });
+  server.serve([&] {
+    if (power_cut != 0) device.power_cycle();
+    power_cut = 0;
+    return interrupted != 0;
+  });
   return 0;
 }
 

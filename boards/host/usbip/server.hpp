@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // USB/IP 1.1.1 (Linux, Documentation/usb/usbip_protocol.rst) on loopback: the kernel of this PC, or of a guest,
 // attaches to the device as if it hung on a cable. One device (bus id 1-1), one client that has it; a closed connection
-// is a pulled cable. Every length that comes from the socket is checked before it is used; who breaks the protocol is
-// cut off.
+// is a pulled cable, and a device that leaves the bus closes it. Every length that comes from the socket is checked
+// before it is used; who breaks the protocol is cut off.
 #pragma once
 
 #include <cstdint>
@@ -49,6 +49,7 @@ class Server {
   void deliver(const Transfer& transfer);
   bool flush(Client& client);
   void leave(Client& client);
+  void part_if_device_left();
 
   Device& device_;
   Transfers transfers_;
@@ -56,7 +57,8 @@ class Server {
   std::list<Client> clients_;
 };
 
-/// What a program around a server does: says how to attach, serves until Ctrl-C, returns its exit code.
+/// What a program around a server does: says how to attach, serves until Ctrl-C, returns its exit code. A SIGHUP cuts
+/// the device's power for a moment.
 int serve_until_interrupted(Device& device, std::uint16_t port);
 
 }  // namespace boards::usb

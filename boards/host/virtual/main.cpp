@@ -46,6 +46,7 @@ class Cable final : public usb::Device {
     board_.advance(periods);
     owed_s_ -= periods * board_.period_s();
   }
+  void power_cycle() override { board_.power_cycle(); }
 
  private:
   static usb::Answer::Kind kind(Handshake h) {
@@ -79,6 +80,7 @@ int main(int argc, char** argv) {
       "  virtual-board                 a board on USB/IP port 3240, until Ctrl-C\n"
       "  virtual-board --chip          the flash image on the chip model instead of the host build\n"
       "  virtual-board --port 0        any port that is free (it is printed)\n"
+      "  kill -HUP PID                 its power goes and comes back\n"
       "Exit codes: 0 done, 2 the command line or a file is wrong, 6 the port is taken.\n"
       "A board that isn't there, as a USB device that a kernel can attach.\n",
       "virtual-board"};
