@@ -35,6 +35,7 @@ class Scripted final : public Device {
   }
   Answer in(unsigned, int) override { return honest ? Answer{Answer::ack, true, std::exchange(answer_, {})} : next(); }
   void run(double) override {}
+  void power_cycle() override {}
 
   bool pulled_up = true, honest = true;
   Bytes device = device_bytes, configuration = configuration_bytes;

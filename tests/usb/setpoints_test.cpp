@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+// How quickly a setpoint is obeyed, and how surely a silent host is left.
+
+#include <cmath>
+
+#include "tests/usb/linked.hpp"
+
+namespace {
+
+using namespace usb_host;
+
+TEST_F(Linked, ADisarmThatFollowsAnArmInTheSamePeriodWins) {
+  program.write(Program::framed(Kind::arm, 1, {1}));
+  program.write(Program::framed(Kind::disarm, 2, {1}));
+  program.exchange();
+  board.advance(5);
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::off);
+}
+
+TEST_F(Linked, ASetpointIsADutyWithinTwoPwmPeriods) {
+  arm(3);
+  for (int k = 0; k < 200; ++k) {  // awake, currents settled at zero
+    program.write(Program::framed(Kind::setpoint, 0, setpoint(3, 0.0f)));
+    program.pass(20);
+  }
+  ASSERT_EQ(axis(0).mode(), firmware::Mode::running);
+  const wire::Abc before = axis(0).fast().ratio;
+  program.write(Program::framed(Kind::setpoint, 0, setpoint(3, 5.0f)));
+  program.exchange();  // the packet has arrived
+  EXPECT_EQ(axis(0).fast().permitted_A.q, 0.0f);
+  board.advance(1);
+  EXPECT_EQ(axis(0).fast().permitted_A.q, 5.0f);
+  EXPECT_NE(axis(0).fast().ratio.b, before.b) << "the duty of the very next tick: loads one period after it";
+}
+
+TEST_F(Linked, BothAxesFollowTheirOwnSetpoints) {
+  arm(3);
+  wire::State state{};
+  for (int k = 0; k < 30; ++k) {
+    state = set(3, 3.0f, -2.0f);
+    program.pass(20);
+  }
+  EXPECT_NEAR(state.axis[0].iq_A, 3.0f, 0.2f);
+  EXPECT_NEAR(state.axis[1].iq_A, -2.0f, 0.2f);
+  EXPECT_GT(state.axis[0].speed_rad_per_s, 1.0f);
+  EXPECT_LT(state.axis[1].speed_rad_per_s, -1.0f);
+  EXPECT_EQ(state.axis[0].mode, 2);
+  EXPECT_NEAR(state.bus_V, 48.0f, 0.1f);
+  EXPECT_GT(state.axis[0].allowance_A, 10.0f);
+  const auto later = program.call_for<wire::State>(Kind::state);
+  EXPECT_GT(later.period, state.period);
+}
+
+TEST_F(Linked, OneAxisFedDoesNotKeepTheOtherAlive) {
+  arm(3);
+  for (int k = 0; k < 10; ++k) set(3, 2.0f, 2.0f), program.pass(20);
+  for (int k = 0; k < 400; ++k) set(1, 2.0f), program.pass(20);
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::running);
+  EXPECT_EQ(axis(1).mode(), firmware::Mode::ready) << "faded and stopped";
+}
+
+TEST_F(Linked, ASetpointThatIsNoCurrentIsRefusedAndFeedsNobody) {
+  arm(1);
+  for (int k = 0; k < 10; ++k) set(1, 1.0f), program.pass(20);
+  for (int k = 0; k < 400; ++k) {
+    EXPECT_EQ(set(1, std::nanf("")).axis[0].refused, number(Status::not_a_current));
+    program.pass(20);
+  }
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::ready);
+}
+
+TEST_F(Linked, DamagedFramesFeedNobody) {
+  arm(1);
+  for (int k = 0; k < 10; ++k) set(1, 1.0f), program.pass(20);
+  Bytes damaged = Program::framed(Kind::setpoint, 0, setpoint(1, 1.0f));
+  damaged[6] ^= 0x40;
+  for (int k = 0; k < 400; ++k) program.write(damaged), program.pass(20);
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::ready);
+  EXPECT_GE(board.link().bad_frames(), 400u);
+}
+
+/// R1: from 100 ms after the last setpoint (safety.md: +- 5 ms) the current fades, 200 ms later the bridge is open.
+TEST_F(Linked, ASilentHostIsLeftAtAHundredMilliseconds) {
+  arm(1);
+  for (int k = 0; k < 50; ++k) set(1, 4.0f), program.pass(20);
+  program.write(Program::framed(Kind::setpoint, 0, setpoint(1, 4.0f)));
+  program.exchange();
+  int periods = 0;
+  while (axis(0).fast().permitted_A.q > 3.999f && periods < 10000) board.advance(1), ++periods;
+  EXPECT_NEAR(periods * board.period_s(), 0.1, 0.001);
+  EXPECT_EQ(axis(0).fast().limit, wire::Limit::setpoint_old);
+  while (axis(0).mode() == firmware::Mode::running && periods < 20000) board.advance(1), ++periods;
+  EXPECT_NEAR(periods * board.period_s(), 0.3, 0.002);
+}
+
+/// Both axes' setpoint and state, one exchange a USB frame, packets at most as many as a full-speed frame holds.
+TEST_F(Linked, ExchangesBothAxesAtAKilohertz) {
+  arm(3);
+  int exchanges = 0;
+  for (int ms = 0; ms < 1000; ++ms) {
+    program.ask(Kind::setpoint, setpoint(3, 1.0f, -1.0f));
+    for (int packet = 0; packet < 4; ++packet) program.exchange();  // 19 of 64 bytes fit into a frame
+    board.advance(20);
+    while (!program.frames().empty()) {
+      exchanges += program.frames().front().kind == wire::reply_to(Kind::setpoint);
+      program.frames().pop_front();
+    }
+  }
+  EXPECT_GE(exchanges, 999);
+}
+
+}  // namespace
