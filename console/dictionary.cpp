@@ -56,7 +56,12 @@ std::vector<Target> Dictionary::named(const std::string& name, const std::string
     if (fits(full_name(target)) || fits(full_name(*target.what))) found.push_back(target);
   }
   if (found.empty()) {
-    const std::string hint = wire::pc::did_you_mean(name, names());
+    const auto known = names();
+    const auto begun = std::find_if(known.begin(), known.end(), [&](const std::string& full) {
+      return !start.empty() && full.rfind(start, 0) == 0;
+    });
+    const std::string hint =
+        begun != known.end() ? fmt::format(", did you mean '{}'?", *begun) : wire::pc::did_you_mean(name, known);
     throw wire::pc::UserError(
         wire::pc::Exit::usage,
         fmt::format("{}he board has no {} '{}'{} 'hotcore {}' lists them.", where.empty() ? "T" : where + ": t", kind_,

@@ -122,7 +122,8 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
 
 void add_motion(CLI::App& app, Console& console) {
   struct Arguments {
-    std::string axis, course;
+    std::string axis;
+    std::vector<std::string> course;  // quoted or not
     float iq_A = 0, seconds = 1e9f;
     bool clear = false;
   };
@@ -144,7 +145,8 @@ void add_motion(CLI::App& app, Console& console) {
   command = app.add_subcommand("run", "arm, play a course of current, disarm");
   a = with_axis(command, "0", true);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\"")->required();
-  command->callback([&console, a] { play(console, a->axis, profile_in(a->course, 1000)); });
+  command->callback(
+      [&console, a] { play(console, a->axis, profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000)); });
 
   command = app.add_subcommand("stop", "disarm");
   a = with_axis(command, "both", true);
@@ -162,7 +164,7 @@ void add_motion(CLI::App& app, Console& console) {
   command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
   a = with_axis(command, "0", false);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
-  command->callback([&console, a] { ask(console, a->axis, a->course); });
+  command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " "))); });
 }
 
 }  // namespace console

@@ -48,22 +48,27 @@ bool read_line(std::string& line) {
 std::vector<std::string> completions(Console& console, const std::string& line, const std::string& word) {
   std::vector<std::string> known;
   const std::string before = line.substr(0, line.size() - std::min(line.size(), word.size()));
-  if (before.find_first_not_of(' ') == std::string::npos) {
-    CLI::App app;
-    add_commands(app, console);
-    for (const CLI::App* command : app.get_subcommands({})) known.push_back(command->get_name());
+  const std::size_t first = before.find_first_not_of(' ');
+  const std::string command = first == std::string::npos ? "" : before.substr(first, before.find(' ', first) - first);
+  CLI::App app;
+  add_commands(app, console);
+  if (command.empty()) {
+    for (const CLI::App* one : app.get_subcommands({})) known.push_back(one->get_name());
     known.push_back("quit");
+  } else if (word.rfind('-', 0) == 0) {
+    for (const CLI::App* one : app.get_subcommands({})) {
+      if (one->get_name() != command) continue;
+      for (const CLI::Option* option : one->get_options()) {
+        if (!option->get_lnames().empty()) known.push_back("--" + option->get_lnames().front());
+      }
+    }
   } else {
-    const std::string command =
-        before.substr(before.find_first_not_of(' '), before.find(' ', before.find_first_not_of(' ')));
     try {
-      const bool signals =
-          command.rfind("watch", 0) == 0 || command.rfind("log", 0) == 0 || command.rfind("capture", 0) == 0;
-      if (signals)
+      if (command == "watch" || command == "log" || command == "capture")
         known = console.session().signals().names();
-      else if (command.rfind("get", 0) == 0 || command.rfind("set", 0) == 0)
+      else if (command == "get" || command == "set")
         known = console.session().parameters().names();
-      if (command.rfind("set", 0) == 0) {
+      if (command == "set") {
         for (std::string& name : known) name += "=";
       }
     } catch (const UserError&) {

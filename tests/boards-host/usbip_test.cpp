@@ -335,6 +335,23 @@ TEST_F(UsbIp, ADeviceThatFallsSilentIsAProtocolErrorAndNobodyImportsIt) {
   EXPECT_EQ(status, 3u);
 }
 
+TEST_F(UsbIp, MoreReadsThanAKernelKeepsEndTheConnection) {
+  Client c(server.port());
+  ASSERT_EQ(c.import(), 0u);
+  Bytes many;
+  for (std::uint32_t i = 1; i <= 257; ++i) {
+    Bytes one = submit(i, 1, true, 64);
+    std::fill_n(one.begin() + 32, 4, std::uint8_t{0xFF});  // no isochronous packets, as some kernels say it
+    many.insert(many.end(), one.begin(), one.end());
+  }
+  c.say(Bytes(many.begin(), many.end() - 48));
+  c.say(unlink(300, 256));
+  EXPECT_EQ(get(c.hear(48), 4), 300u) << "256 of them wait";
+  c.say(submit(256, 1, true, 64));
+  c.say(Bytes(many.end() - 48, many.end()));
+  EXPECT_TRUE(c.cut_off());
+}
+
 TEST_F(UsbIp, AFifthClientIsTurnedAway) {
   Client four[4] = {Client(server.port()), Client(server.port()), Client(server.port()), Client(server.port())};
   for (Client& c : four) EXPECT_EQ(c.import("9-9"), 1u);  // each of them was let in

@@ -190,12 +190,15 @@ TEST_F(Commands, CompletionKnowsTheBoardsOwnNames) {
   EXPECT_EQ(console::completions(console_, "ca", "ca"), (Words{"calibrate", "capture"}));
   EXPECT_EQ(console::completions(console_, "set axis1.cur", "axis1.cur"), Words{"axis1.current_limit_A="});
   EXPECT_EQ(console::completions(console_, "watch sp", "sp"), Words{"speed_rad_per_s"});
+  EXPECT_EQ(console::completions(console_, "fault --c", "--c"), Words{"--clear"});
+  EXPECT_EQ(console::completions(console_, "dance --c", "--c"), Words{});
 }
 
 // ---- what is wrong
 // ----------------------------------------------------------------------------------------------------
 
 TEST_F(Commands, AnUnknownParameterGetsTheNearest) {
+  refused("get axis0.current_", 2, "did you mean 'axis0.current_limit_A'");
   refused("get curent_limit_A", 2, "did you mean 'current_limit_A'");
   refused("set axis0.current_limt_A=3", 2, "did you mean 'axis0.current_limit_A'");
   refused("watch axis0.coer_a_degC", 2, "did you mean 'axis0.core_a_degC'");

@@ -335,6 +335,31 @@ TEST(ParameterStore, TheNewestCountsWhereverItStandsAndAnEraseThatFailsLosesNoth
   EXPECT_EQ(last.saved_serial(), 9u);
 }
 
+TEST(ParameterStore, WhatWasStagedIsTakenBackToTheSavedOrToTheDefaults) {
+  Bench b;
+  b.put_in_force();
+  EXPECT_EQ(b.store.load(wire::LoadFrom::saved).status, code(Status::nothing_saved));
+  EXPECT_FALSE(b.store.uncommitted()) << "what is refused stages nothing";
+  EXPECT_TRUE(b.store.unsaved());
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  EXPECT_FALSE(b.store.unsaved());
+
+  ASSERT_EQ(b.store.stage({{0x0111, 1}, 12.0f}).status, 0);
+  ASSERT_EQ(b.store.commit(b.driver).status, 0);
+  b.tick(1);
+  EXPECT_TRUE(b.store.unsaved());
+  ASSERT_EQ(b.store.load(wire::LoadFrom::saved).status, 0);
+  EXPECT_TRUE(b.store.uncommitted());
+  ASSERT_EQ(b.store.commit(b.driver).status, 0);
+  b.tick(1);
+  EXPECT_FALSE(b.store.unsaved());
+
+  ASSERT_EQ(b.store.load(wire::LoadFrom::defaults).status, 0);
+  ASSERT_EQ(b.store.commit(b.driver).status, 0);
+  b.tick(1);
+  EXPECT_EQ(b.driver.axis(0).arm(), Status::parameters_unset);
+}
+
 TEST(ParameterStore, AStoreTooSmallForARecordHoldsNone) {
   Bench b;
   b.put_in_force();
