@@ -48,7 +48,8 @@ TEST_F(Enumeration, DeviceDescriptorIsTheTableOfTheSpecification) {
             (Bytes{18, 1, 0x01, 0x02, 0xEF, 0x02, 0x01, 64, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 3, 1}));
 }
 
-// USB 2.0 tables 9-10, 9-12, 9-13; IAD ECN table 9-Z; CDC 1.2 tables 15, 16; PSTN 1.2 tables 3, 4.
+// USB 2.0 tables 9-10, 9-12, 9-13; IAD ECN table 9-Z; CDC 1.2 tables 15, 16; PSTN 1.2 tables 3, 4. Subtypes 0 header, 1
+// call management, 2 ACM, 6 union.
 TEST_F(Enumeration, ConfigurationDescriptorIsTheTableOfTheSpecification) {
   const Bytes expected{9, 2,    98,   0,    3,    1,    0,    0xC0, 0,                       //
                        9, 4,    0,    0,    2,    0xFF, 0,    0,    4,                       // vendor
@@ -64,7 +65,8 @@ TEST_F(Enumeration, ConfigurationDescriptorIsTheTableOfTheSpecification) {
   EXPECT_EQ(descriptor(configuration_type, 9), Bytes(expected.begin(), expected.begin() + 9));
 }
 
-// Microsoft OS 2.0 Descriptors Specification: table 4 (platform capability), 3 (Windows version).
+// Microsoft OS 2.0 Descriptors Specification (July 2018), tables 4 and 5; 0x06030000 is Windows 8.1. But for length and
+// vendor code the same bytes as in Zephyr's sample of a CMSIS-DAP and in a capture from a Blue Pill with WebUSB.
 TEST_F(Enumeration, BosNamesTheMicrosoftSet) {
   EXPECT_EQ(descriptor(bos_type, 255),
             (Bytes{5,    0x0F, 33,   0,    1,                                                                       //
@@ -72,7 +74,7 @@ TEST_F(Enumeration, BosNamesTheMicrosoftSet) {
                    0x9E, 0x64, 0x8A, 0x9F, 0x00, 0x00, 0x03, 0x06, 0xB2, 0x00, 0x20, 0x00}));
 }
 
-// Microsoft OS 2.0 Descriptors Specification: tables 10 to 15. 178 bytes for one GUID, as in everybody's example.
+// The same, tables 9 to 15; type 7 is REG_MULTI_SZ. A name of 42 and one GUID of 80 bytes, as in Zephyr's sample.
 TEST_F(Enumeration, MicrosoftSetIsTheTableOfTheSpecification) {
   Bytes expected{0x0A, 0, 0, 0, 0x00, 0x00, 0x03, 0x06, 0xB2, 0,                                  //
                  0x08, 0, 1, 0, 0,    0,    0xA8, 0,                                              //

@@ -87,6 +87,15 @@ class Program {
     ASSERT_TRUE(control(board_->bus(), address, {0x00, 9, 1, 0, 0}));
   }
 
+  /// SET_FEATURE and CLEAR_FEATURE(ENDPOINT_HALT), as after an error on the bus.
+  void halt_and_clear(std::uint8_t endpoint) {
+    for (const std::uint8_t feature : {std::uint8_t{3}, std::uint8_t{1}})
+      ASSERT_TRUE(control(board_->bus(), address, {0x02, feature, 0, endpoint, 0}));
+    ((endpoint & hal::endpoint_in) != 0 ? in_data1_ : out_data1_) = false;
+  }
+  /// Gives up what was not sent yet.
+  void give_up() { to_send_.clear(); }
+
   void write(const Bytes& bytes) { to_send_.insert(to_send_.end(), bytes.begin(), bytes.end()); }
   void ask(wire::Kind kind, const Bytes& payload = {}) { write(framed(kind, ++sequence_, payload)); }
   std::uint8_t sequence() const { return sequence_; }

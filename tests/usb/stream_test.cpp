@@ -33,6 +33,51 @@ TEST_F(Linked, AHostThatNeverReadsIsToldToWaitAndThenLeft) {
   EXPECT_EQ(axis(0).mode(), firmware::Mode::ready);
 }
 
+/// A halt drops the packet in flight and nothing else: who is torn out of step is in step again at the next delimiter.
+TEST_F(Linked, AHaltInTheMiddleOfARequestCostsItAndAtMostTheNext) {
+  for (int written = 1; written < 4; ++written) {
+    const std::uint32_t bad = board.link().bad_frames();
+    program.ask(Kind::stage, Bytes(7 * 40));  // five packets
+    for (int i = 0; i < written; ++i) program.exchange();
+    program.halt_and_clear(wire::link_out_endpoint);
+    program.give_up();
+    program.ask(Kind::state);
+    EXPECT_FALSE(program.answer(400)) << "swallowed: it had no delimiter in front";
+    EXPECT_EQ(program.status(Kind::state), 0) << written;
+    EXPECT_EQ(board.link().bad_frames(), bad + 1) << "the torn one and the swallowed one look like one";
+  }
+}
+
+TEST_F(Linked, ADelimiterInFrontSavesTheNextRequestToo) {
+  program.ask(Kind::stage, Bytes(7 * 40));
+  program.exchange();
+  program.halt_and_clear(wire::link_out_endpoint);
+  program.give_up();
+  program.write({0});
+  EXPECT_EQ(program.status(Kind::state), 0);
+}
+
+TEST_F(Linked, AHaltInTheMiddleOfAnAnswerCostsItAndAtMostTheNext) {
+  for (int read = 1; read < 4; ++read) {
+    program.ask(Kind::get, Bytes(3 * 60));
+    program.exchange();
+    for (int i = 0; i < read; ++i) program.exchange();
+    program.halt_and_clear(wire::link_in_endpoint);
+    program.ask(Kind::state);
+    (void)program.answer(400);
+    EXPECT_EQ(program.status(Kind::state), 0) << read;
+    EXPECT_EQ(program.status(Kind::state), 0) << read;
+  }
+}
+
+TEST_F(Linked, ABusResetInTheMiddleOfAFrameCostsNothingAfterwards) {
+  program.ask(Kind::stage, Bytes(7 * 40));
+  program.exchange();
+  program = Program(board);
+  program.connect();
+  EXPECT_EQ(program.status(Kind::state), 0) << "the first request of the new session";
+}
+
 TEST_F(Linked, ABusResetForgetsAPacketThatWaitedForRoom) {
   bool data1 = board.bus().toggle(wire::link_out_endpoint);
   for (std::uint8_t i = 0; i < 200; ++i) {  // nobody reads: the queue fills, the last packet waits
