@@ -312,7 +312,8 @@ void Commands::capture(const wire::Frame& request, Reply& reply) {
   if (!select(request, sizeof order, order.decimation, selection, reply)) return;
   trigger.edge = order.edge;
   trigger.level = order.level;
-  if (order.edge > wire::Edge::falling || order.post == 0) return reply.refuse(Status::out_of_range);
+  const bool ends = selection.count == 0;
+  if (order.edge > wire::Edge::falling || (order.post == 0 && !ends)) return reply.refuse(Status::out_of_range);
   if (order.edge != wire::Edge::now) {
     trigger.place = place(order.trigger);
     if (!trigger.place.exists()) return reply.refuse(Status::no_such_signal, order.trigger.axis, order.trigger.id);

@@ -160,6 +160,18 @@ TEST_F(Linked, ACaptureHoldsEveryPeriodBeforeAndAfterItsTrigger) {
   EXPECT_NEAR(all[399].values[0], 5.0f, 0.3f);
 }
 
+TEST_F(Linked, ACaptureThatWaitsIsGivenUpByOneWithoutSignals) {
+  const wire::SignalAddress iq{id_iq, 0};
+  ASSERT_EQ(
+      program.status(Kind::capture, bytes_of(wire::CaptureOrder{iq, wire::Edge::rising, 0, 50.0f, 10, 10, 1}, iq)), 0);
+  program.pass(40);
+  ASSERT_EQ(program.call_for<wire::CaptureStatus>(Kind::capture_status).phase, wire::CapturePhase::waiting);
+  ASSERT_EQ(program.status(Kind::capture, bytes_of(wire::CaptureOrder{{0, 0}, wire::Edge::now, 0, 0, 0, 0, 1})), 0);
+  program.pass(40);
+  EXPECT_EQ(program.call_for<wire::CaptureStatus>(Kind::capture_status).phase, wire::CapturePhase::idle);
+  EXPECT_EQ(program.status(Kind::capture_read, bytes_of(wire::Index{0})), number(Status::nothing_captured));
+}
+
 TEST_F(Linked, AnEarlyTriggerHasFewerRowsBeforeIt) {
   const wire::SignalAddress rotor{id_rotor, 0};
   ASSERT_EQ(
