@@ -78,6 +78,10 @@ void TextPort::obey(char* line) {
   const auto is = [verb](const char* word) { return std::strcmp(verb, word) == 0; };
   if (is("help")) return help();
   if (is("state")) return state();
+  if (is("get")) {
+    const char* const name = next_word(line);
+    return get(name, next_word(line));
+  }
   int i = 0;
   const bool commands_axis = is("arm") || is("disarm") || is("clear") || is("iq");
   if (!commands_axis) return say("unknown command; try: help\r\n");
@@ -98,7 +102,29 @@ void TextPort::help() {
   say("state            both axes\r\n"
       "arm 0            ready for setpoints; disarm 0, clear 0 (after a fault)\r\n"
       "iq 0 1.5         amperes; fades unless it is sent again within the time-out\r\n"
+      "get pole_pairs   a parameter of both axes; get pole_pairs 0: of one\r\n"
       "Everything else: the program hotcore.\r\n");
+}
+
+void TextPort::get(const char* name, const char* axis) {
+  int first = 0, last = axis_count - 1;
+  if (*axis != 0) {
+    if (!axis_number(axis, first)) return say("name axis 0 or 1\r\n");
+    last = first;
+  }
+  int index = 0;
+  while (index < parameter_count && std::strcmp(parameter_info(index)->name, name) != 0) ++index;
+  if (index == parameter_count) return say("no such parameter; names and ranges: hotcore get\r\n");
+  const wire::ParameterInfo& p = *parameter_info(index);
+  for (int i = first; i <= last; ++i) {
+    float value = 0.0f;
+    (void)commands_.parameters().get({p.id, static_cast<std::uint8_t>(i)}, value);
+    say(i == 0 ? "axis 0: " : "axis 1: ");
+    say_exactly(value);
+    say(" ");
+    say(wire::text_of(p.unit));
+    say("\r\n");
+  }
 }
 
 void TextPort::state() {
@@ -149,6 +175,27 @@ void TextPort::say(float value) {
     if (i == 2) digits[--at] = '.';
     digits[--at] = static_cast<char>('0' + hundredths % 10);
     hundredths /= 10;
+  }
+  say(digits + at);
+}
+
+/// Six digits that count and no exponent, up to a million.
+void TextPort::say_exactly(float value) {
+  if (value != value) return say("not set");
+  if (value < 0.0f) say("-");
+  float scaled = value < 0.0f ? -value : value;
+  if (!(scaled < 1e6f)) return say("a million or more");
+  int decimals = 0;
+  for (; scaled < 1e5f && decimals < 12; ++decimals) scaled *= 10.0f;
+  auto rest = static_cast<std::uint32_t>(scaled + 0.5f);
+  for (; decimals > 0 && rest % 10 == 0; --decimals) rest /= 10;
+  char digits[16];
+  std::size_t at = sizeof digits;
+  digits[--at] = 0;
+  for (int i = 0; i <= decimals || rest > 0; ++i) {
+    if (i == decimals && decimals > 0) digits[--at] = '.';
+    digits[--at] = static_cast<char>('0' + rest % 10);
+    rest /= 10;
   }
   say(digits + at);
 }

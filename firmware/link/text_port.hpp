@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The text port: one-line commands for people without the tool, in any terminal program. A usb::Stream for the USB
-// context. Small on purpose: no telemetry, no saving; a setpoint fades like any other unless it is sent again.
+// context. Small on purpose: no telemetry; parameters are shown and not changed (that is an errand of the link's); a
+// setpoint fades like any other unless it is sent again.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +25,10 @@ class TextPort {
   void obey(char* line);
   void help();
   void state();
+  void get(const char* name, const char* axis);
   void say(const char* text);
   void say(float value);
+  void say_exactly(float value);
   void say(wire::Status status);
 
   Commands& commands_;

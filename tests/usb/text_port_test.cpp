@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The text port as a person at a terminal meets it.
 
+#include <cmath>
 #include <string>
 
 #include "tests/usb/linked.hpp"
@@ -53,6 +54,27 @@ TEST_F(Linked, TheTextPortAnswersInPlainLines) {
   EXPECT_NE(type("state\n").find("a phase current passed the trip level"), std::string::npos);
   EXPECT_NE(type("arm 0\n").find("read the fault"), std::string::npos);
   EXPECT_NE(type("clear 7\narm 0\n").find("name axis"), std::string::npos);
+  EXPECT_EQ(program.status(Kind::stage, bytes_of(wire::Assignment{{0x0111, 1}, 7.5f})), 0);
+  EXPECT_EQ(program.status(Kind::commit), 0);
+  EXPECT_EQ(type("get current_limit 1\n"), "axis 1: 7.5 A\r\n");
+  EXPECT_EQ(type("get current_limit\n"), "axis 0: 20 A\r\naxis 1: 7.5 A\r\n");
+  for (const char* bad : {"get current_limit 2\n", "get current_limit x\n"})
+    EXPECT_EQ(type(bad), "name axis 0 or 1\r\n") << bad;
+  for (const char* bad : {"get\n", "get current\n", "get current_limit_ 0\n"})
+    EXPECT_EQ(type(bad).substr(0, 17), "no such parameter") << bad;
+  for (int i = 0; i < firmware::parameter_count; ++i) {  // to six digits what the link says
+    const wire::ParameterInfo& p = *firmware::parameter_info(i);
+    float value = 0;
+    ASSERT_EQ(board.parameters().get({p.id, 0}, value), Status::done);
+    const std::string answer = type(std::string("get ") + p.name + " 0\n"), unit = wire::text_of(p.unit);
+    ASSERT_EQ(answer.substr(0, 8), "axis 0: ") << p.name;
+    if (std::isnan(value))
+      EXPECT_EQ(answer, "axis 0: not set " + unit + "\r\n") << p.name;
+    else if (std::abs(value) >= 1e6f)
+      EXPECT_EQ(answer, "axis 0: a million or more " + unit + "\r\n") << p.name;
+    else
+      EXPECT_NEAR(std::stof(answer.substr(8)), value, 1e-5f * std::abs(value) + 1e-12f) << p.name << ' ' << answer;
+  }
   EXPECT_EQ(type("clear 0\n"), "ok\r\n");
   board.advance(2);
   EXPECT_NE(type("state\n").find("axis 0: off"), std::string::npos);
