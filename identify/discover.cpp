@@ -111,9 +111,22 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     span = std::max(span, high - low);
   }
   if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
-  // A baseline that is wrong may stretch its time constant without end; what the search started from may not.
-  const Physical p = physical(problem, base.x);
-  const double housing_s = std::min(p.R2_K_per_W * p.C2_J_per_K, problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
+  // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
+  const auto time_constant_s = [&](const Fit& f) {
+    const Physical p = physical(problem, f.x);
+    return p.R2_K_per_W * p.C2_J_per_K;
+  };
+  double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
+    Problem one = problem;
+    one.logs = {problem.logs[l]};
+    const Fit alone = fit(one, {});
+    if (alone.x.size() == 0) continue;
+    const double inflation = std::max(1.0, std::sqrt(2 * alone.misfit / std::max(1, alone.readings)));
+    const auto lines = base_lines(one, alone, inflation);
+    if (lines[1].determined && lines[3].determined) housing_s = std::min(housing_s, time_constant_s(alone));
+  }
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
   if (all < housing_s) {
@@ -247,6 +260,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   // Both models as the last search fitted them.
   const Fit& two = poor.empty() ? found.base.fit : base;
   if (!extended) found.chosen.fit = two;
+  const Fit* written = &found.chosen.fit;
   if (!poor.empty()) {
     report.verdict = word(Verdict::insufficient);
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
@@ -254,16 +268,28 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
+    // Where the data cannot choose, a board must not take the milder model for true.
+    if (extended && found.verdict == Verdict::ambiguous) {
+      std::vector<const Fit*> open = {written, &two};
+      for (const Candidate& c : found.sets) {
+        if (c.tied) open.push_back(&c.fit);
+      }
+      written = &most_cautious(problem, open);
+      const std::string ids = listed(ids_of(written->chosen), " and ");
+      report.reasoning.push_back(
+          fmt::format("The model written for the board is the one that bears a push the shortest: {}.",
+                      ids.empty() ? "the two-resistor model" : ids));
+    }
     if (extended) {
       add_extended(problem, found.chosen.fit, report, 0);
-      if (report.core_refusal.empty()) report.gain = gain_of(problem, two, found.chosen.fit);
+      if (report.core_refusal.empty() && written != &two) report.gain = gain_of(problem, two, *written);
     }
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);
   }
   if (held.fraction > 0 || !held.logs.empty())
     report.held_out = score_held_out(whole, motor, held, two, found.chosen.fit, report);
-  report.model_toml = heat_set_toml(problem, found.chosen.fit, report.sentence);
+  report.model_toml = heat_set_toml(problem, *written, report.sentence);
   report.baseline_toml = heat_set_toml(problem, two, "The two-resistor model as fitted, without what was found.");
   return report;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "identify/model_file.hpp"
 #include "thermal/look_ahead.hpp"
@@ -153,6 +154,33 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
   return Gain{before.overshoot_K,           after.overshoot_K,           before.burst_s,   after.burst_s,
               before.continuous_A * direct, after.continuous_A * direct, burst_A * direct, work[Drive::speed_rad_per_s],
               work[Boundary::ambient]};
+}
+
+const Fit& most_cautious(const Problem& problem, const std::vector<const Fit*>& fits) {
+  if (problem.heated_by_power()) return *fits.front();
+  const thermal::HeatInput<> work = working_point(problem);
+  const double most_A = 50 * problem.rms_A;
+  // One current for all, above what any of them carries for an hour.
+  double burst_A = 0;
+  std::vector<std::optional<thermal::HeatSet<double>>> sets;
+  const auto answers = [&](std::size_t i, double at_A) {
+    return answers_of(*sets[i], trust_of(*fits[i]), *sets[i], work, most_A, at_A);
+  };
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    sets.emplace_back(heat_set_of(problem, *fits[i]));
+    if (!thermal::validate(*sets[i], estimator_dt_s).ok())
+      sets[i].reset();
+    else
+      burst_A = std::max(burst_A, burst_over_continuous * answers(i, 0).continuous_A);
+  }
+  const Fit* best = fits.front();
+  double least_s = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (!sets[i] || !(burst_A > 0)) continue;
+    const double s = answers(i, burst_A).burst_s;
+    if (s < least_s) least_s = s, best = fits[i];
+  }
+  return *best;
 }
 
 }  // namespace identify

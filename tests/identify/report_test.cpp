@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "identify/discover.hpp"
+#include "identify/gain.hpp"
 #include "identify/held_out.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
@@ -106,6 +107,20 @@ TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
     EXPECT_TRUE(gain.at(key).is_number()) << key;
   EXPECT_NE(identify::as_text(report, false).find("What it is worth"), std::string::npos);
   EXPECT_NE(identify::as_html(report).find("What it is worth"), std::string::npos);
+}
+
+TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  const auto path = tests::write_bench_log("hotcore_cautious.csv", options);
+  const auto problem = identify::problem_of(identify::logs_of(identify::read_table(path), {}, std::nullopt),
+                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  const identify::Fit found = identify::fit(problem, {});
+  identify::Fit light = found, heavy = found;
+  light.x[2] -= 0.5;  // ln of the winding's capacity
+  heavy.x[2] += 0.5;
+  EXPECT_EQ(&identify::most_cautious(problem, {&found, &light, &heavy}), &light);
+  EXPECT_EQ(&identify::most_cautious(problem, {&heavy, &found}), &found);
 }
 
 TEST(Report, WhatIsAdequateHasNothingToGain) {
@@ -255,6 +270,18 @@ TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
   EXPECT_GT(j["held_out"]["rmse_before_K"]["housing"], 20);
   EXPECT_GT(j["held_out"]["worst_before_K"], 50);
   EXPECT_LT(j["baseline"]["rmse_K"]["core"], 6);
+}
+
+TEST(MeasuredData, AFanMakesNoSessionTooShort) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const auto said = [&](const std::string& runs) { return run(runs + " --map " + maps + "tass.toml").out; };
+  // The fan run determines its own time constant, about 420 s, and the session is longer; the still-air runs' is 2150
+  // s.
+  const std::string still = data + "tass_run1.csv " + data + "tass_run3.csv ";
+  const std::string all = said(still + data + "tass_run4_fan.csv");
+  EXPECT_EQ(all.find("Verdict: insufficient"), std::string::npos) << all;
+  EXPECT_NE(all.find("~ cooling_change"), std::string::npos) << all;
+  EXPECT_NE(said(still).find("less than the housing's time constant"), std::string::npos);
 }
 
 TEST(MeasuredData, CoppersCoefficientMakesPaderbornWorse) {
