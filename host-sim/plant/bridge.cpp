@@ -68,7 +68,8 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
   const double period_s = period_s_;
   const double dead = design_.dead_time_s * design_.pwm_Hz;
   const std::array<double, 3> current_A = motor.current_A();
-  const double per_soft = 1 / soft_A_;
+  // Below the current that dead time ends within a period it would turn it round for ever.
+  const double per_soft = 1 / std::max(soft_A_, dead * bus_V * period_s / motor.mean_inductance_H());
   std::array<double, 3> effective, drop_V, terminal_V;
   for (int k = 0; k < 3; ++k) {
     effective[k] = ratio[k];

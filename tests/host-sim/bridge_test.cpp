@@ -103,6 +103,17 @@ TEST(Bridge, DeadTimeErrsByDutyTimesBusAgainstTheCurrentAndTheDiodesAddTheirDrop
   }
 }
 
+TEST(Bridge, DeadTimeLetsACurrentEndAndKeepsNoOscillationUp) {
+  Locked bench(host_sim::motor_from_sheet(plant_tests::small_motor()), BridgeDesign{});
+  bench.run({{0.52f, 0.5f, 0.5f}, true}, 48, 100);
+  ASSERT_GT(bench.motor.current_A()[0], 0.1);
+  bench.run({{0.5f, 0.5f, 0.5f}, true}, 48, 100);
+  for (int n = 0; n < 4; ++n) {
+    bench.run({{0.5f, 0.5f, 0.5f}, true}, 48, 1);
+    EXPECT_NEAR(bench.motor.current_A()[0], 0, 1e-3);
+  }
+}
+
 TEST(Bridge, SwitchedAndAveragedAgreeOnATurningMotor) {
   std::array<double, 2> speed_rad_per_s{}, copper_J{}, bus_J{};
   for (const bool switched : {false, true}) {
