@@ -19,7 +19,7 @@ struct Margins {
   double remains = 15;
   double dominance = 5;  // what one cause explains over what it leaves, to be named as the larger part
   /// Or: the disturbance left beside the causes, of what the baseline misses, K over K. Effects outside the table left
-  /// 0.11 at least beside an imitation that was not complete (38 such logs, duty and designed,
+  /// 0.11 at least beside an imitation that was not complete (39 such logs, duty and designed,
   /// seeds 1..4, 21..32, 41..52).
   double small_part = 0.1;
   double noticeable_K = 0.25;  // what a cause must move, rms, in the winding or at the sensor, to be worth a name
