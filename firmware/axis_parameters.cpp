@@ -5,8 +5,6 @@ namespace firmware {
 
 namespace {
 
-/// Field values in the dictionary's order, beside their dictionary ids by name.
-constexpr int parameter_count = static_cast<int>(sizeof(axis_dictionary) / sizeof(axis_dictionary[0]));
 enum : std::uint16_t {
 #define PARAM(id, name, unit, fallback, min, max, doc) id_##name = id,
 #include "firmware/axis.params"
@@ -16,17 +14,13 @@ enum : std::uint16_t {
 }  // namespace
 
 Finding validate(const AxisParameters& p, const BoardRating& r) {
-  const float values[parameter_count] = {
+  const float values[] = {
 #define PARAM(id, name, unit, fallback, min, max, doc) p.name##_##unit,
 #include "firmware/axis.params"
 #undef PARAM
   };
-  for (int i = 0; i < parameter_count; ++i) {
-    if (wire::is_unset(values[i])) return {axis_dictionary[i].id, values[i], true};
-  }
-  for (int i = 0; i < parameter_count; ++i) {
-    if (!axis_dictionary[i].holds(values[i])) return {axis_dictionary[i].id, values[i], false};
-  }
+  const Finding outside = first_outside(axis_dictionary, values);
+  if (outside.id != 0) return outside;
   if (p.pole_pairs_count != static_cast<float>(static_cast<int>(p.pole_pairs_count)))
     return {id_pole_pairs, p.pole_pairs_count, false};
   if (!(p.current_limit_A <= r.peak_A)) return {id_current_limit, p.current_limit_A, false};

@@ -3,6 +3,7 @@
 // Declared in axis.params, one line each. Not for an ISR.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "firmware/board_rating.hpp"
@@ -33,6 +34,18 @@ struct Finding {
   float value;
   bool missing;
 };
+
+/// Each value (in the dictionary's order) was given and lies in its range; missing ones are named first.
+template <std::size_t count>
+[[nodiscard]] Finding first_outside(const wire::ParameterInfo (&dictionary)[count], const float (&values)[count]) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (wire::is_unset(values[i])) return {dictionary[i].id, values[i], true};
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!dictionary[i].holds(values[i])) return {dictionary[i].id, values[i], false};
+  }
+  return {0, 0.0f, false};
+}
 
 [[nodiscard]] Finding validate(const AxisParameters& set, const BoardRating& rating);
 

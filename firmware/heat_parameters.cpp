@@ -6,7 +6,6 @@
 namespace firmware {
 
 namespace {
-constexpr int parameter_count = static_cast<int>(sizeof(heat_dictionary) / sizeof(heat_dictionary[0]));
 enum : std::uint16_t {
 #define PARAM(id, name, unit, fallback, min, max, doc) id_##name = id,
 #include "firmware/heat.params"
@@ -15,17 +14,13 @@ enum : std::uint16_t {
 }  // namespace
 
 Finding validate(const HeatParameters& p) {
-  const float values[parameter_count] = {
+  const float values[] = {
 #define PARAM(id, name, unit, fallback, min, max, doc) p.name##_##unit,
 #include "firmware/heat.params"
 #undef PARAM
   };
-  for (int i = 0; i < parameter_count; ++i) {
-    if (wire::is_unset(values[i])) return {heat_dictionary[i].id, values[i], true};
-  }
-  for (int i = 0; i < parameter_count; ++i) {
-    if (!heat_dictionary[i].holds(values[i])) return {heat_dictionary[i].id, values[i], false};
-  }
+  const Finding outside = first_outside(heat_dictionary, values);
+  if (outside.id != 0) return outside;
   if (p.housing_sensor_count != 0.0f && p.housing_sensor_count != 1.0f)
     return {id_housing_sensor, p.housing_sensor_count, false};
   // The estimate would begin above the limit and never allow anything.

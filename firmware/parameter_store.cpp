@@ -98,8 +98,8 @@ const wire::ParameterInfo* parameter_info(int index) {
 }
 
 std::uint8_t parameter_flags(int index) {
-  const wire::ParameterInfo* info = parameter_info(index);
-  const bool whole = info != nullptr && (info->id == 0x0105 || info->id == 0x020E);  // pole_pairs, housing_sensor
+  const bool whole = index < drive_count ? drive_fields[index] == &AxisParameters::pole_pairs_count
+                                         : heat_fields[index - drive_count] == &HeatParameters::housing_sensor_count;
   return static_cast<std::uint8_t>(wire::needs_disarmed | (whole ? wire::whole_number : 0));
 }
 

@@ -139,8 +139,7 @@ void Application::supply_falls() {
   keeper_.last_words(good_);
 }
 
-// ---- main loop
-// --------------------------------------------------------------------------------------------------------
+// ---- main loop ------------------------------------------------------------------------------------------------------
 
 void Application::run() {
   bring_up_interrupts(clock_good_ ? hclk_Hz : hsi_Hz);

@@ -5,8 +5,8 @@
 //   EXTI            index pulse                    rotor zero
 //   OTG_FS          a packet, or a ms of the bus   requests, setpoints, telemetry: below the fast lane, above the slow
 //   EXTI 16         supply falls                   gates off, last heat into the journal
-//   main loop       every 1 ms (SysTick wakes it)  slow conversions, door, errands of USB; every 10 ms the slow lane;
-//   feeds the IWDG
+//   main loop       every 1 ms (SysTick wakes it)  slow conversions, door, errands of USB; feeds the IWDG
+//                   every 10 ms                    slow lane
 //
 // The IWDG is fed only when both fast lanes and the slow lane have moved on, the WWDG only from the fast lane of axis 1
 // when axis 0 has run since: a hang of either lane resets the chip, and reset opens the gates.
@@ -60,14 +60,14 @@ class Application {
   char serial_[25]{};  // the chip's unique id: 24 digits
   firmware::usb::Identity identity_{"h8-15d", firmware::version, serial_};
   firmware::Link link_{driver_, recorder_, parameters_, identity_, rating};
-  firmware::TextPort text_{link_.commands()};
+  firmware::TextPort text_{link_};
   UsbController usb_port_;
   firmware::usb::Device<UsbController, firmware::Link, firmware::TextPort> usb_{usb_port_, identity_, link_, text_};
   bool usb_connected_ = false;
   PowerStage stage_;
   std::atomic<std::uint32_t> milliseconds_{0};
   std::atomic<std::uint32_t> fast_ticks_[2]{};
-  std::uint32_t fast_fed_ = 0, fed_[2]{}, slow_ticks_ = 0, slow_fed_ = 0, slow_ms_ = 0;
+  std::uint32_t fast_fed_ = 0, fed_[2]{}, slow_ticks_ = 0, slow_ms_ = 0;
   bool index_seen_[2]{};
   bool good_ = false, clock_good_ = false;
   int slow_channel_ = 0, force_axis_ = 0;

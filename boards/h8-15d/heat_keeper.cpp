@@ -37,10 +37,11 @@ Recalled HeatKeeper::recall(firmware::DriverMemory& memory) {
     for (std::uint32_t w = 0; w < record_words; ++w) kept[w] = reg(backup_slot(i) + 4 * w);
     const auto payload = firmware::whole_payload({reinterpret_cast<const std::uint8_t*>(kept), sizeof kept}, magic);
     if (payload.size() != sizeof memory) continue;
-    const std::uint32_t serial = kept[2];
-    if (from == Recalled::backup_memory && static_cast<std::int32_t>(serial - serial_) < 0) continue;
+    firmware::RecordHeader header;
+    std::memcpy(&header, kept, sizeof header);
+    if (from == Recalled::backup_memory && static_cast<std::int32_t>(header.serial - serial_) < 0) continue;
     memory_of(payload, memory);
-    serial_ = serial;
+    serial_ = header.serial;
     newest_ = i;
     from = Recalled::backup_memory;
   }

@@ -48,6 +48,8 @@ class Link {
   }
 
   Commands& commands() { return commands_; }
+  /// False while the main context checks or saves parameters: until then nobody arms and nobody stages. USB context.
+  bool parameters_free() const;
   /// Frames that were torn or damaged.
   std::uint32_t bad_frames() const { return reader_.bad(); }
 
@@ -66,7 +68,6 @@ class Link {
   void return_errand();
   wire::Answer load();
   void look_ahead();
-  bool parameters_free() const;
   template <class Message>
   void finish(const Message& message) {
     static_assert(sizeof message <= sizeof errand_answer_);

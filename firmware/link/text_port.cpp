@@ -87,7 +87,7 @@ void TextPort::obey(char* line) {
   if (!commands_axis) return say("unknown command; try: help\r\n");
   if (!axis_number(next_word(line), i)) return say("name axis 0 or 1\r\n");
   Axis& axis = commands_.driver().axis(i);
-  if (is("arm")) return say(axis.arm());
+  if (is("arm")) return say(link_.parameters_free() ? axis.arm() : wire::Status::busy);
   if (is("clear")) return say(axis.clear());
   if (is("disarm")) {
     axis.disarm();

@@ -7,13 +7,13 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "firmware/link/commands.hpp"
+#include "firmware/link/link.hpp"
 
 namespace firmware {
 
 class TextPort {
  public:
-  explicit TextPort(Commands& commands) : commands_(commands) {}
+  explicit TextPort(Link& link) : link_(link), commands_(link.commands()) {}
 
   // usb::Stream
   void restart() { line_count_ = said_ = count_ = 0, too_long_ = false; }
@@ -31,6 +31,7 @@ class TextPort {
   void say_exactly(float value);
   void say(wire::Status status);
 
+  const Link& link_;
   Commands& commands_;
   char line_[64]{};
   std::size_t line_count_ = 0;

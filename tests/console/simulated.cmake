@@ -1,25 +1,8 @@
 # Every command of hotcore on the simulated board of --sim, which is the firmware itself: exit code and what is said.
 #   cmake -D HOTCORE=.../hotcore -D IDENTIFY=.../identify -D SCRATCH=... -P simulated.cmake
-cmake_minimum_required(VERSION 3.25)
-file(REMOVE_RECURSE ${SCRATCH})
-file(MAKE_DIRECTORY ${SCRATCH})
+include(${CMAKE_CURRENT_LIST_DIR}/expect.cmake)
 set(ENV{HOTCORE_SIM_FAST} 1)  # simulated time does not wait for the world's
-set(failures "")
-
-# expect(NAME code regex PROGRAM ARGUMENTS...), standard input from ${typed}
-function(expect name code regex)
-  file(WRITE ${SCRATCH}/typed "${typed}")
-  execute_process(COMMAND ${ARGN} WORKING_DIRECTORY ${SCRATCH} INPUT_FILE ${SCRATCH}/typed
-                  RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE err TIMEOUT 120)
-  if(NOT result EQUAL code OR NOT "${out}${err}" MATCHES "${regex}")
-    list(APPEND failures "${name}: exit code ${result} (wanted ${code}), did not match '${regex}': ${out}${err}")
-    set(failures "${failures}" PARENT_SCOPE)
-  else()
-    message(STATUS "${name}: exit code ${result}: ${CMAKE_MATCH_0}")
-  endif()
-endfunction()
 set(sim ${HOTCORE} --sim)
-set(typed "")
 
 expect(list 0 "SIM0" ${sim} list)
 expect(get 0 "axis1.R1_K_per_W +1.08" ${sim} get)
@@ -53,7 +36,4 @@ expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
 set(typed "")
 expect(identification 0 "axis0.R2_K_per_W +16.3 -> 1[567].*In force until" ${sim} identify --minutes 6 --out found --yes)
 
-if(failures)
-  list(JOIN failures "\n  " text)
-  message(FATAL_ERROR "not as promised:\n  ${text}")
-endif()
+nothing_failed()

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "boards/host/virtual/virtual_board.hpp"
+#include "tests/firmware/bench.hpp"
 
 namespace usb_host {
 
@@ -17,26 +18,9 @@ using boards::host::Handshake;
 using boards::host::VirtualBoard;
 using Bytes = std::vector<std::uint8_t>;
 
-/// EC-powermax class, as the firmware's bench has it.
-inline wire::Motor motor() {
-  wire::Motor m{};
-  m.phase_resistance_ohm = 0.193;
-  m.inductance_d_H = m.inductance_q_H = 32.5e-6;
-  m.flux_linkage_Wb = 27.6e-3 / (1.7320508 * 2);
-  m.pole_pairs = 2;
-  m.rotor_inertia_kg_m2 = 33.3e-7;
-  m.R1_K_per_W = 0.209;
-  m.R2_K_per_W = 7.4;
-  m.C1_J_per_K = 2.11 / 0.209;
-  m.C2_J_per_K = 1180 / 7.4;
-  m.copper_coefficient_per_K = 0.00393;
-  m.winding_max_degC = 155;
-  return m;
-}
-
 inline boards::host::VirtualBoardOptions options() {
   boards::host::VirtualBoardOptions o;
-  o.motor = motor();
+  o.motor = bench::motor();
   return o;
 }
 

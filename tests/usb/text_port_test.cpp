@@ -77,6 +77,14 @@ TEST_F(Linked, TheTextPortAnswersInPlainLines) {
   }
   EXPECT_EQ(type("clear 0\n"), "ok\r\n");
   board.advance(2);
+  program.ask(Kind::commit);
+  program.exchange();  // asked, and the main context has not had its turn
+  EXPECT_EQ(type("arm 1\n").find("ok"), std::string::npos) << "nobody arms while parameters are put in force";
+  board.advance(100);
+  EXPECT_EQ(type("arm 1\n"), "ok\r\n");
+  board.advance(2);
+  EXPECT_EQ(type("disarm 1\n"), "ok\r\n");
+  board.advance(2);
   EXPECT_NE(type("state\n").find("axis 0: off"), std::string::npos);
 }
 
