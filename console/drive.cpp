@@ -58,8 +58,9 @@ Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& prof
     while (session.now_s() < end_s) {
       stop_if_interrupted("Stopped and disarmed.");
       const bool turning = along == Along::q;
-      const float d_A = turning ? 0 : piece.current_A, q_A = turning ? piece.current_A : 0;
-      const wire::State state = session.exchange({mask, {}, {d_A, d_A}, {q_A + hold_A[0], q_A + hold_A[1]}});
+      const float d_A = turning ? 0 : piece.level, q = turning ? piece.level : 0;
+      const wire::State state =
+          session.exchange({mask, {piece.mode, piece.mode}, 0, {d_A, d_A}, {q + hold_A[0], q + hold_A[1]}});
       const double now_s = session.now_s();
       for (int a = 0; a < wire::axis_count; ++a) {
         if ((mask >> a & 1) == 0) continue;
@@ -71,8 +72,8 @@ Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& prof
           hold_A[a] = std::clamp(-hold_A_s_per_rad * state.axis[a].speed_rad_per_s, -hold_most_A, hold_most_A);
         if (state.axis[a].refused != 0) {
           const wire::CodeText text = wire::text_of(state.axis[a].refused);
-          throw UserError(Exit::refused, fmt::format("Axis {} refused the setpoint {:g} A: {}; {}.", a, piece.current_A,
-                                                     text.happened, text.advice));
+          throw UserError(Exit::refused, fmt::format("Axis {} refused the setpoint {:g} {}: {}; {}.", a, piece.level,
+                                                     unit_of(piece.mode), text.happened, text.advice));
         }
       }
       const wire::AxisReport& axis = state.axis[first];

@@ -20,6 +20,7 @@ _hotcore() {
     case $command in
       get) words=$("${COMP_WORDS[0]}" "${choice[@]}" get --names 2>/dev/null) ;;
       set) words=$("${COMP_WORDS[0]}" "${choice[@]}" get --names 2>/dev/null | sed 's/$/=/'); compopt -o nospace 2>/dev/null ;;
+      mode) words="current torque" ;;
       watch | log | capture) words=$("${COMP_WORDS[0]}" "${choice[@]}" signals --names 2>/dev/null) ;;
       *) COMPREPLY=($(compgen -f -- "$word")); return ;;
     esac

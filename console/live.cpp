@@ -33,6 +33,7 @@ Json json_of(const wire::State& state, double time_s) {
   Json axes = Json::array();
   for (const wire::AxisReport& axis : state.axis) {
     axes.push_back({{"mode", mode_text(axis.mode)},
+                    {"control", wire::text_of(axis.control)},
                     {"limit", wire::text_of(axis.limit).name},
                     {"fault", wire::text_of(axis.fault).name},
                     {"id_A", number(axis.id_A)},
@@ -52,8 +53,8 @@ Live::Live(std::uint8_t mask) : mask_(mask), terminal_(on_terminal()), trails_(w
 std::string Live::table(const wire::State& state, double time_s) const {
   std::string text;
   if (terminal_ || lines_ == 0) {
-    text = fmt::format("{:>8} {:>7}  {:<5}{:<8}{:>8}{:>8}{:>9}{:>14}{:>9}{:>11}   {}\n", "time s", "bus V", "axis",
-                       "mode", "id A", "iq A", "rad/s", "core degC", "housing", "allowed A", "limit");
+    text = fmt::format("{:>8} {:>7}  {:<5}{:<8}{:<8}{:>8}{:>8}{:>9}{:>14}{:>9}{:>11}   {}\n", "time s", "bus V", "axis",
+                       "mode", "control", "id A", "iq A", "rad/s", "core degC", "housing", "allowed A", "limit");
   }
   for (int a = 0; a < wire::axis_count; ++a) {
     if ((mask_ >> a & 1) == 0) continue;
@@ -62,8 +63,8 @@ std::string Live::table(const wire::State& state, double time_s) const {
     const char* holding = axis.fault != 0   ? wire::text_of(axis.fault).name
                           : axis.limit != 0 ? wire::text_of(axis.limit).name
                                             : "";
-    text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n", time_s,
-                        state.bus_V, a, mode_text(axis.mode), axis.id_A, axis.iq_A, axis.speed_rad_per_s, core,
+    text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n", time_s,
+                        state.bus_V, a, mode_text(axis.mode), wire::text_of(axis.control), axis.id_A, axis.iq_A, axis.speed_rad_per_s, core,
                         axis.housing_degC, axis.allowance_A, holding);
   }
   return text;

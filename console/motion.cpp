@@ -46,10 +46,27 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
   console.say(text, json_of(driven));
 }
 
-/// Armed at a steady current until Ctrl-C or for so long.
-void arm(Console& console, const std::string& axis, float iq_A, float seconds) {
-  console.tell(fmt::format("Armed at {:g} A; Ctrl-C disarms.", iq_A));
-  play(console, axis, {{iq_A, seconds}});
+/// Armed at a steady level until Ctrl-C or for so long.
+void arm(Console& console, const std::string& axis, const Piece& piece) {
+  console.tell(fmt::format("Armed at {:g} {}; Ctrl-C disarms.", piece.level, unit_of(piece.mode)));
+  play(console, axis, {piece});
+}
+
+/// What setpoints mean: chosen if `wish` names one, and told.
+void mode(Console& console, const std::string& axis, const std::string& wish) {
+  Session& session = console.session();
+  if (!wish.empty())
+    session.choose(mask_of(axis), wish == "torque" ? wire::ControlMode::torque : wire::ControlMode::current);
+  const wire::State state = session.state();
+  std::string text;
+  Json json = Json::object();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask_of(axis) >> a & 1) == 0) continue;
+    const wire::ControlMode control = state.axis[a].control;
+    text += fmt::format("axis {}: {} mode, setpoints in {}\n", a, wire::text_of(control), unit_of(control));
+    json[fmt::format("axis{}", a)] = {{"control", wire::text_of(control)}};
+  }
+  console.say(text, json);
 }
 
 void stop(Console& console, const std::string& axis) {
@@ -88,7 +105,9 @@ void fault(Console& console, const std::string& axis, bool clear) {
                                       {"advice", code.advice}};
     if (!clear || evidence.fault == 0) continue;
     const auto one = static_cast<std::uint8_t>(1 << a);
-    console.session().exchange({one, {}, {0, 0}, {0, 0}});  // only a zero setpoint may stand when a fault is cleared
+    const wire::State now = console.session().state();
+    // Only a zero setpoint may stand when a fault is cleared.
+    console.session().exchange({one, {now.axis[0].control, now.axis[1].control}, 0, {0, 0}, {0, 0}});
     console.session().clear(one);
     text += "        cleared; the axis is off.\n";
     json[fmt::format("axis{}", a)]["cleared"] = true;
@@ -98,8 +117,11 @@ void fault(Console& console, const std::string& axis, bool clear) {
 
 void ask(Console& console, const std::string& axis, const std::string& course) {
   std::vector<wire::Segment> segments;
-  for (const Piece& piece : profile_in(course, wire::max_segments))
-    segments.push_back({piece.seconds, piece.current_A});
+  for (const Piece& piece : profile_in(course, wire::max_segments)) {
+    if (piece.mode != wire::ControlMode::current)
+      throw UserError(Exit::usage, "The look-ahead takes amperes; write the course as \"20A 0.3s, 6A 5s\".");
+    segments.push_back({piece.seconds, piece.level});
+  }
   const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
   std::string text;
   if (outlook.feasible != 0) {
@@ -124,7 +146,8 @@ void add_motion(CLI::App& app, Console& console) {
   struct Arguments {
     std::string axis;
     std::vector<std::string> course;  // quoted or not
-    float iq_A = 0, seconds = 1e9f;
+    std::string mode;
+    float iq_A = 0, torque_Nm = 0, seconds = 1e9f;
     bool clear = false;
   };
   const auto with_axis = [&](CLI::App* command, const std::string& otherwise, bool both) {
@@ -136,15 +159,26 @@ void add_motion(CLI::App& app, Console& console) {
     return a;
   };
 
-  CLI::App* command = app.add_subcommand("arm", "hold an axis armed at a steady current until Ctrl-C");
+  CLI::App* command = app.add_subcommand("arm", "hold an axis armed at a steady current or torque until Ctrl-C");
   auto a = with_axis(command, "0", true);
-  command->add_option("--iq", a->iq_A, "amperes")->capture_default_str();
+  CLI::Option* const iq = command->add_option("--iq", a->iq_A, "amperes")->capture_default_str();
+  CLI::Option* const torque = command->add_option("--torque", a->torque_Nm, "N m, in torque mode")->excludes(iq);
   command->add_option("--seconds", a->seconds, "disarm by itself after so long");
-  command->callback([&console, a] { arm(console, a->axis, a->iq_A, a->seconds); });
+  command->callback([&console, a, torque] {
+    arm(console, a->axis,
+        torque->count() > 0 ? Piece{a->torque_Nm, a->seconds, wire::ControlMode::torque} : Piece{a->iq_A, a->seconds});
+  });
 
-  command = app.add_subcommand("run", "arm, play a course of current, disarm");
+  command = app.add_subcommand("mode", "what setpoints mean: current, or torque by the magnet's flux; or tell it");
+  a = with_axis(command, "both", true);
+  command->add_option("MODE", a->mode, "current or torque; every start begins with current")
+      ->check(CLI::IsMember({"current", "torque"}));
+  command->callback([&console, a] { mode(console, a->axis, a->mode); });
+
+  command = app.add_subcommand("run", "arm, play a course of current or torque, disarm");
   a = with_axis(command, "0", true);
-  command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\"")->required();
+  command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\", in torque mode \"50mNm 1s\"")
+      ->required();
   command->callback(
       [&console, a] { play(console, a->axis, profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000)); });
 

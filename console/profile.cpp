@@ -17,11 +17,13 @@ struct Unit {
   float factor;
 };
 constexpr Unit ampere_units[] = {{"A", 1.0f}, {"mA", 1e-3f}, {"", 1.0f}};
+constexpr Unit torque_units[] = {{"Nm", 1.0f}, {"mNm", 1e-3f}};
 constexpr Unit second_units[] = {{"s", 1.0f}, {"ms", 1e-3f}, {"min", 60.0f}, {"", 1.0f}};
 
-/// Takes a number and its unit off the front of `text`. False: there is none.
+/// Takes a number and its unit off the front of `text`. False: there is none, and nothing is taken.
 template <std::size_t n>
-bool quantity(std::string_view& text, const Unit (&units)[n], float& value) {
+bool quantity(std::string_view& all, const Unit (&units)[n], float& value) {
+  std::string_view text = all;
   const auto skip = [&] {
     while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
   };
@@ -37,12 +39,15 @@ bool quantity(std::string_view& text, const Unit (&units)[n], float& value) {
     if (text.substr(0, letters) != unit.name) continue;
     value *= unit.factor;
     text.remove_prefix(letters);
+    all = text;
     return true;
   }
   return false;
 }
 
 }  // namespace
+
+const char* unit_of(wire::ControlMode mode) { return mode == wire::ControlMode::torque ? "N m" : "A"; }
 
 std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
   using wire::pc::Exit, wire::pc::UserError;
@@ -51,18 +56,28 @@ std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
   for (std::string part; std::getline(stream, part, ',');) {
     Piece piece{};
     std::string_view rest = part;
-    const bool read = quantity(rest, ampere_units, piece.current_A) && quantity(rest, second_units, piece.seconds);
+    bool read = quantity(rest, ampere_units, piece.level);
+    if (!read) {
+      read = quantity(rest, torque_units, piece.level);
+      piece.mode = wire::ControlMode::torque;
+    }
+    read = read && quantity(rest, second_units, piece.seconds);
     if (!read || rest.find_first_not_of(' ') != std::string_view::npos || !(piece.seconds > 0)) {
       throw UserError(
           Exit::usage,
-          fmt::format("'{}' is no piece of a current profile; write amperes and seconds, such as \"20A 0.3s, 6A 5s\".",
+          fmt::format("'{}' is no piece of a course; write amperes (or Nm) and seconds, such as \"20A 0.3s, 6A 5s\".",
                       part));
+    }
+    if (!pieces.empty() && pieces.front().mode != piece.mode) {
+      throw UserError(Exit::usage, fmt::format("'{}' has another unit than the pieces before it; a course is of current "
+                                               "or of torque, write one or the other.",
+                                               part));
     }
     pieces.push_back(piece);
   }
   if (pieces.empty() || pieces.size() > most) {
     throw UserError(Exit::usage,
-                    fmt::format("The current profile has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
+                    fmt::format("The course has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
                                 pieces.size(), most));
   }
   return pieces;

@@ -1,17 +1,26 @@
 // SPDX-License-Identifier: MIT
-// A course of current as a person writes it: "20A 0.3s, 6A 5s, -2.5A 200ms". A bare number is amperes, then seconds.
+// A course as a person writes it: "20A 0.3s, 6A 5s, -2.5A 200ms", or of torque: "50mNm 0.3s, 0Nm 1s". A bare number is
+// amperes, then seconds.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "wire/protocol.hpp"
+
 namespace console {
 
 struct Piece {
-  float current_A, seconds;
+  float level;  // A or N m, as `mode` says
+  float seconds;
+  wire::ControlMode mode = wire::ControlMode::current;
 };
 
-/// At least one piece, at most `most`; finite amperes, seconds above zero. Throws UserError (usage) naming the piece.
+/// "A" or "N m".
+const char* unit_of(wire::ControlMode mode);
+
+/// At least one piece, at most `most`, all of one mode; finite levels, seconds above zero. Throws UserError (usage)
+/// naming the piece.
 std::vector<Piece> profile_in(const std::string& text, std::size_t most);
 
 }  // namespace console

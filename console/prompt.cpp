@@ -62,6 +62,8 @@ std::vector<std::string> completions(Console& console, const std::string& line, 
         if (!option->get_lnames().empty()) known.push_back("--" + option->get_lnames().front());
       }
     }
+  } else if (command == "mode") {
+    known = {"current", "torque"};
   } else {
     try {
       if (command == "watch" || command == "log" || command == "capture")

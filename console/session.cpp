@@ -195,6 +195,11 @@ void Session::clear(std::uint8_t mask) {
   request(Kind::clear, bytes_of(wire::Axes{mask}), "clear the fault of " + axes_of(mask));
 }
 
+void Session::choose(std::uint8_t mask, wire::ControlMode mode) {
+  request(Kind::mode, bytes_of(wire::ChooseMode{mask, mode}),
+          fmt::format("put {} in {} mode", axes_of(mask), wire::text_of(mode)));
+}
+
 wire::State Session::exchange(const wire::Setpoints& setpoints) {
   const auto state = link::state_in(request(Kind::setpoint, bytes_of(setpoints), "take setpoints"));
   if (!state) misread("take setpoints");

@@ -43,6 +43,7 @@ class Session {
   void arm(std::uint8_t mask);
   void disarm(std::uint8_t mask);
   void clear(std::uint8_t mask);
+  void choose(std::uint8_t mask, wire::ControlMode mode);
   wire::State exchange(const wire::Setpoints& setpoints);
   wire::State state();
   wire::FaultEvidence fault(int axis);

@@ -86,6 +86,7 @@ void Axis::judge(const AxisSetup& setup) {
 void Axis::take_over() {
   const AxisParameters& p = next_;
   configured_ = next_state_ == SetState::good;
+  A_per_Nm_ = unset;
   if (!configured_) {
     permit_ = {};
     if (next_state_ == SetState::refused)
@@ -101,6 +102,7 @@ void Axis::take_over() {
   dead_time_ = DeadTime(rating_.dead_time_s, rating_.pwm_Hz, p.dead_time_soft_A);
   // Line-to-line back-EMF below half the bus: no diode conducts, whatever the ripple.
   quiet_rad_per_s_per_V_ = 0.5f / (1.7320508f * p.flux_linkage_Wb * p.pole_pairs_count);
+  A_per_Nm_ = 1.0f / (1.5f * p.pole_pairs_count * p.flux_linkage_Wb);
   offset_bound_A_ = p.offset_bound_A;
   inductance_H_ = 0.5f * (p.inductance_d_H + p.inductance_q_H);
   pwm_Hz_ = rating_.pwm_Hz;
@@ -218,6 +220,12 @@ wire::Status Axis::arm() {
   const wire::Status answer = against_arming();
   if (answer == wire::Status::done) post(Command::arm);
   return answer;
+}
+
+wire::Status Axis::against(wire::ControlMode mode) const {
+  if (!at_rest()) return wire::Status::mode_in_use;
+  if (mode == wire::ControlMode::torque && !(A_per_Nm_ > 0.0f)) return wire::Status::parameters_unset;
+  return wire::Status::done;
 }
 
 wire::Status Axis::clear() {

@@ -33,6 +33,7 @@
 #include "thermal/core_estimator.hpp"
 #include "thermal/governor.hpp"
 #include "wire/codes.hpp"
+#include "wire/protocol.hpp"
 
 namespace firmware {
 
@@ -112,8 +113,24 @@ class Axis {
   void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board);
 
   /// Current command, amperes of phase amplitude (id, iq); keeps the axis alive for setpoint_timeout_s. Wakes an armed
-  /// axis.
-  wire::Status set_current(const Dq& current_A) { return setpoint_.set(current_A); }
+  /// axis. Refused in another control mode.
+  wire::Status set_current(const Dq& current_A) {
+    return control_ == wire::ControlMode::current ? setpoint_.set(current_A) : wire::Status::other_mode;
+  }
+  /// The same in torque mode. Becomes a current here and nowhere else; every limit is one of current and comes after.
+  wire::Status set_torque(float id_A, float torque_Nm) {
+    return control_ == wire::ControlMode::torque ? setpoint_.set({id_A, torque_Nm * A_per_Nm_})
+                                                 : wire::Status::other_mode;
+  }
+
+  /// What setpoints mean from now on. Only at rest, and torque only with a complete set.
+  wire::Status choose(wire::ControlMode mode) {
+    const wire::Status answer = against(mode);
+    if (answer == wire::Status::done) control_ = mode;
+    return answer;
+  }
+  wire::Status against(wire::ControlMode mode) const;
+  wire::ControlMode control() const { return control_; }
 
   /// off -> ready. Only setpoints that come later count. The answer says what speaks against it; done = posted.
   wire::Status arm();
@@ -203,6 +220,8 @@ class Axis {
     }
   } trace_;
   Mode mode_ = Mode::off;
+  wire::ControlMode control_ = wire::ControlMode::current;  // of the lower context; the fast lane knows current only
+  float A_per_Nm_ = unset;
   bool configured_ = false;             // the parameter set is complete and valid
   bool sees_ = false;                   // the last sample was admitted
   float quiet_rad_per_s_per_V_ = 0.0f;  // below it the back-EMF cannot push current through the diodes

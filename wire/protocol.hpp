@@ -24,7 +24,7 @@ namespace wire {
 static_assert(std::endian::native == std::endian::little, "messages are memory images");
 
 /// Rises when a PC that knows only the older one would misread the board, or the other way round.
-inline constexpr std::uint16_t protocol_version = 1;
+inline constexpr std::uint16_t protocol_version = 2;  // 2: control modes
 
 /// pid.codes' test id: a placeholder, to be replaced before anything is sold. https://pid.codes/1209/0001/
 inline constexpr std::uint16_t usb_vendor_id = 0x1209, usb_product_id = 0x0001;
@@ -52,6 +52,7 @@ enum class Kind : std::uint8_t {        // request                            an
   fault              = 0x15,            // Axes                               FaultEvidence        of the lowest axis named
   calibrate          = 0x16,            // Axes                               Offsets              of the lowest axis named
   ask                = 0x17,            // Ask + Segment[]                    Outlook              up to 60 s
+  mode               = 0x18,            // ChooseMode                         Answer               all of them or none
   subscribe          = 0x20,            // Subscribe + SignalAddress[]        Answer               none: end
   capture            = 0x21,            // CaptureOrder + SignalAddress[]     Answer               none: end
   capture_status     = 0x22,            // -                                  CaptureStatus
@@ -87,12 +88,28 @@ enum class LoadFrom : std::uint8_t { in_force = 0, saved = 1, defaults = 2 };
 struct Load {
   LoadFrom from;
 };
-/// Amperes of phase amplitude for the axes in `mask`: the others keep what they have, and their clocks run on.
+/// What a setpoint means. Each start begins with current.
+enum class ControlMode : std::uint8_t {
+  current = 0,  // A of phase amplitude
+  torque = 1,   // N m, by 3/2 pole pairs flux linkage: what the magnet makes, at the temperature of the sheet
+};
+inline constexpr int control_mode_count = 2;
+constexpr const char* text_of(ControlMode mode) {
+  constexpr const char* texts[control_mode_count] = {"current", "torque"};
+  return static_cast<int>(mode) < control_mode_count ? texts[static_cast<int>(mode)] : "unknown";
+}
+struct ChooseMode {
+  std::uint8_t mask;
+  ControlMode mode;
+};
+/// For the axes in `mask`: the others keep what they have, and their clocks run on. `mode` is what the numbers are
+/// meant as: an axis that has another mode refuses them.
 struct Setpoints {
   std::uint8_t mask;
-  std::uint8_t zero[3]{};
+  ControlMode mode[axis_count]{};
+  std::uint8_t zero = 0;
   float id_A[axis_count];
-  float iq_A[axis_count];
+  float q[axis_count];  // current: iq in A; torque: N m
 };
 /// One piece of a motion: |i| for some time.
 struct Segment {
@@ -184,6 +201,8 @@ struct AxisReport {
   std::uint8_t limit;        // wire::Limit
   std::uint8_t fault;        // wire::Fault
   std::uint8_t refused = 0;  // wire::Status of the setpoint in this exchange
+  ControlMode control;       // what a setpoint means
+  std::uint8_t zero[3]{};
   float id_A, iq_A;          // measured
   float speed_rad_per_s;     // mechanical
   float rotor_rad;           // mechanical, [0, 2 pi]
@@ -259,9 +278,11 @@ HOTCORE_AT(Address, axis, 2);
 HOTCORE_SIZE(Assignment, 8);
 HOTCORE_AT(Assignment, value, 4);
 HOTCORE_SIZE(Load, 1);
+HOTCORE_SIZE(ChooseMode, 2);
 HOTCORE_SIZE(Setpoints, 20);
+HOTCORE_AT(Setpoints, mode, 1);
 HOTCORE_AT(Setpoints, id_A, 4);
-HOTCORE_AT(Setpoints, iq_A, 12);
+HOTCORE_AT(Setpoints, q, 12);
 HOTCORE_SIZE(Segment, 8);
 HOTCORE_SIZE(Ask, 4);
 HOTCORE_SIZE(SignalAddress, 2);
@@ -288,12 +309,13 @@ HOTCORE_AT(ParameterText, axes, 6);
 HOTCORE_AT(ParameterText, min, 8);
 HOTCORE_SIZE(SignalText, 8);
 HOTCORE_AT(SignalText, axes, 5);
-HOTCORE_SIZE(AxisReport, 40);
-HOTCORE_AT(AxisReport, id_A, 4);
-HOTCORE_AT(AxisReport, speed_rad_per_s, 12);
-HOTCORE_AT(AxisReport, core_degC, 20);
-HOTCORE_AT(AxisReport, allowance_A, 32);
-HOTCORE_SIZE(State, 92);
+HOTCORE_SIZE(AxisReport, 44);
+HOTCORE_AT(AxisReport, control, 4);
+HOTCORE_AT(AxisReport, id_A, 8);
+HOTCORE_AT(AxisReport, speed_rad_per_s, 16);
+HOTCORE_AT(AxisReport, core_degC, 24);
+HOTCORE_AT(AxisReport, allowance_A, 36);
+HOTCORE_SIZE(State, 100);
 HOTCORE_AT(State, period, 4);
 HOTCORE_AT(State, axis, 12);
 HOTCORE_SIZE(FaultEvidence, 20);

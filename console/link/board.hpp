@@ -3,7 +3,8 @@
 //
 //   Board board(usb.open("3A00"));
 //   for (;;) {                                       // 1 kHz, say
-//     board.exchange({3, {{0, iq_A[0]}, {0, iq_A[1]}}});   // both axes' setpoints; the reply is their state
+//     const wire::Setpoints wish{3, {}, 0, {}, {iq_A[0], iq_A[1]}};  // both axes; the reply is their state
+//     board.write(static_cast<std::uint8_t>(wire::Kind::setpoint), bytes_of(wish));
 //     while (const wire::Frame* frame = board.read())  // everything that has arrived
 //       if (const auto state = state_in(*frame)) ...
 //   }

@@ -34,6 +34,7 @@ constexpr Shape shapes[] = {
     {Kind::state, 0, 0, 0},
     {Kind::fault, sizeof(wire::Axes), 0, 0},
     {Kind::calibrate, sizeof(wire::Axes), 0, 0},
+    {Kind::mode, sizeof(wire::ChooseMode), 0, 0},
     {Kind::ask, sizeof(wire::Ask), sizeof(wire::Segment), wire::max_segments},
     {Kind::subscribe, sizeof(wire::Subscribe), sizeof(wire::SignalAddress), wire::max_signals},
     {Kind::capture, sizeof(wire::CaptureOrder), sizeof(wire::SignalAddress), wire::max_signals},
@@ -123,7 +124,9 @@ void Commands::answer(const wire::Frame& request, bool parameters_free, Reply& r
     case Kind::stage:
       return parameters_free ? stage(request, reply) : reply.refuse(Status::busy);
     case Kind::setpoint:
-      return set_currents(head_of<wire::Setpoints>(request), reply);
+      return set(head_of<wire::Setpoints>(request), reply);
+    case Kind::mode:
+      return choose(head_of<wire::ChooseMode>(request), reply);
     case Kind::state:
       return reply.put(state());
     case Kind::subscribe:
@@ -225,11 +228,28 @@ void Commands::for_axes(Kind kind, std::uint8_t mask, Reply& reply) {
   reply.put(wire::Answer{});
 }
 
-void Commands::set_currents(const wire::Setpoints& wish, Reply& reply) {
+void Commands::choose(const wire::ChooseMode& wish, Reply& reply) {
+  if (!names_axes(wish.mask)) return reply.refuse(Status::no_such_axis);
+  if (static_cast<int>(wish.mode) >= wire::control_mode_count) return reply.refuse(Status::out_of_range);
+  for (const bool obeys : {false, true}) {  // all of them or none
+    for (int i = 0; i < axis_count; ++i) {
+      if (!(wish.mask >> i & 1)) continue;
+      Axis& axis = driver_.axis(i);
+      const Status status = obeys ? axis.choose(wish.mode) : axis.against(wish.mode);
+      if (status != Status::done) return reply.refuse(status, static_cast<std::uint8_t>(i));
+    }
+  }
+  reply.put(wire::Answer{});
+}
+
+void Commands::set(const wire::Setpoints& wish, Reply& reply) {
   if (!names_axes(wish.mask)) return reply.refuse(Status::no_such_axis);
   Status refused[axis_count]{};
   for (int i = 0; i < axis_count; ++i) {
-    if (wish.mask >> i & 1) refused[i] = driver_.axis(i).set_current({wish.id_A[i], wish.iq_A[i]});
+    if (!(wish.mask >> i & 1)) continue;
+    Axis& axis = driver_.axis(i);
+    const bool torque = wish.mode[i] == wire::ControlMode::torque;
+    refused[i] = torque ? axis.set_torque(wish.id_A[i], wish.q[i]) : axis.set_current({wish.id_A[i], wish.q[i]});
   }
   wire::State now = state();
   for (int i = 0; i < axis_count; ++i) now.axis[i].refused = static_cast<std::uint8_t>(refused[i]);
@@ -248,6 +268,7 @@ wire::State Commands::state() const {
     report.mode = static_cast<std::uint8_t>(axis.mode());
     report.limit = static_cast<std::uint8_t>(fast.limit);
     report.fault = static_cast<std::uint8_t>(axis.fault().fault);
+    report.control = axis.control();
     report.id_A = fast.current_A.d;
     report.iq_A = fast.current_A.q;
     report.speed_rad_per_s = fast.rad_per_s;

@@ -69,7 +69,8 @@ class Commands {
   void get(const wire::Frame& request, Reply& reply) const;
   void stage(const wire::Frame& request, Reply& reply);
   void for_axes(wire::Kind kind, std::uint8_t mask, Reply& reply);
-  void set_currents(const wire::Setpoints& wish, Reply& reply);
+  void set(const wire::Setpoints& wish, Reply& reply);
+  void choose(const wire::ChooseMode& wish, Reply& reply);
   void fault(int axis, Reply& reply) const;
   void offsets(int axis, Reply& reply) const;
   void subscribe(const wire::Frame& request, Reply& reply);

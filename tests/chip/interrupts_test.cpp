@@ -41,7 +41,7 @@ void in(boards::Pcb& pcb, double seconds, Happens happens) {
 
 /// A program's traffic in turns: setpoints, a long answer, another.
 void talk(Plugged& p, int k) {
-  const wire::Setpoints wish{3, {}, {0, 0}, {4.0f, -4.0f}};
+  const wire::Setpoints wish{3, {}, 0, {0, 0}, {4.0f, -4.0f}};
   const wire::Index first{0};
   const auto out = k % 3 == 0   ? encoded(wire::Kind::setpoint, 1, &wish, sizeof wish)
                    : k % 3 == 1 ? encoded(wire::Kind::describe_parameter, 2, &first, sizeof first)

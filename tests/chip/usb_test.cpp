@@ -59,7 +59,7 @@ TEST(Usb, AnUnknownRequestIsStalledAndTheNextOneWorks) {
 
 /// The next setpoints, exchanged as a robot does each ms.
 wire::State exchange(Plugged& p, float iq0_A, float iq1_A) {
-  return Plugged::as<wire::State>(p.ask(Kind::setpoint, wire::Setpoints{3, {}, {0, 0}, {iq0_A, iq1_A}}));
+  return Plugged::as<wire::State>(p.ask(Kind::setpoint, wire::Setpoints{3, {}, 0, {0, 0}, {iq0_A, iq1_A}}));
 }
 
 bool arm(Plugged& p) {
@@ -96,7 +96,7 @@ TEST(Usb, APulledCableEndsInZeroCurrentAndTheLinkComesBack) {
     const int instants = 20 + static_cast<int>(random() % 400);
     Transfer setpoints = bulk(false, {}, 0, 1);
     for (int ms = 0; ms < 10; ++ms) exchange(p, 4.0f, 4.0f);
-    const wire::Setpoints wish{3, {}, {0, 0}, {4.0f, 4.0f}};  // pulled in the middle of this exchange
+    const wire::Setpoints wish{3, {}, 0, {0, 0}, {4.0f, 4.0f}};  // pulled in the middle of this exchange
     p.host.submit(bulk(false, encoded(Kind::setpoint, 1, &wish, sizeof wish), 0, 1));
     p.host.submit(bulk(true, {}, 512, 2));
     std::vector<Transfer> finished;
@@ -234,7 +234,7 @@ TEST(Usb, ASetpointIsInTheDutyWithinTwoPeriodsOfItsArrival) {
         }
       }
       p.cable.run(static_cast<double>(k) * 50e-6 / 24);  // at any phase of the period
-      const wire::Setpoints wish{3, {}, {8.0f, 8.0f}, {8.0f, 8.0f}};
+      const wire::Setpoints wish{3, {}, 0, {8.0f, 8.0f}, {8.0f, 8.0f}};
       p.host.submit(bulk(false, encoded(Kind::setpoint, 99, &wish, sizeof wish), 0, 1));
       for (finished.clear(); finished.empty();) p.host.turn(finished);
       const double arrived_s = p.host.time_s();  // the packet's last bit and its handshake

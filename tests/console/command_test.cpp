@@ -125,6 +125,37 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   EXPECT_EQ(board_->armed, 0);
 }
 
+TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
+  EXPECT_EQ(json("mode")["axis1"]["control"], "current");
+  EXPECT_EQ(json("mode torque --axis 1")["axis1"]["control"], "torque");
+  EXPECT_EQ(say("mode").out, "axis 0: current mode, setpoints in A\naxis 1: torque mode, setpoints in N m\n");
+  EXPECT_NE(say("watch --json --seconds 0").out.find("\"control\":\"torque\""), std::string::npos);
+  EXPECT_NE(say("watch --seconds 0").out.find("torque "), std::string::npos);
+  EXPECT_EQ(json("run \"50mNm 0.1s, 0Nm 0.1s\" --axis 1")["peak_A"].get<float>(), 0.05f);  // the script's board: as asked
+  EXPECT_EQ(say("arm --torque 0.2 --seconds 0.1 --axis 1").code, 0);
+  refused("run \"20A 1s\" --axis 1", 8, "Axis 1 refused the setpoint 20 A: the setpoint has another unit");
+  refused("run \"1Nm 1s\"", 8, "Axis 0 refused the setpoint 1 N m: the setpoint has another unit");
+  EXPECT_EQ(board_->armed, 0);
+  board_->armed = 2;
+  refused("mode current", 8, "refused to put both axes in current mode: axis 0: the axis is armed");
+  refused("mode voltage", 2, "MODE");
+  refused("run \"1A 1s, 1Nm 1s\"", 2, "has another unit than the pieces before it");
+  refused("ask \"1Nm 1s\"", 2, "takes amperes");
+  refused("arm --iq 1 --torque 1", 2, "excludes");
+}
+
+TEST_F(Commands, AFaultIsClearedInEitherMode) {
+  board_->control[0] = wire::ControlMode::torque;
+  board_->fault = static_cast<std::uint8_t>(wire::Fault::over_current);
+  board_->evidence = {{}, board_->fault, 0, 0, 31.5f, 30.0f, 2.0f};
+  board_->before = [&](Kind kind) {
+    EXPECT_TRUE(kind != Kind::clear || board_->setpoints == 1);
+    return true;
+  };
+  EXPECT_TRUE(json("fault --axis 0 --clear")["axis0"]["cleared"]);
+  EXPECT_EQ(json("watch --seconds 0")["axes"][0]["fault"], "none");
+}
+
 TEST_F(Commands, StopDisarms) {
   board_->armed = 3;
   EXPECT_EQ(say("stop").code, 0);
@@ -191,6 +222,7 @@ TEST_F(Commands, CompletionKnowsTheBoardsOwnNames) {
   EXPECT_EQ(console::completions(console_, "set axis1.cur", "axis1.cur"), Words{"axis1.current_limit_A="});
   EXPECT_EQ(console::completions(console_, "watch sp", "sp"), Words{"speed_rad_per_s"});
   EXPECT_EQ(console::completions(console_, "fault --c", "--c"), Words{"--clear"});
+  EXPECT_EQ(console::completions(console_, "mode t", "t"), Words{"torque"});
   EXPECT_EQ(console::completions(console_, "dance --c", "--c"), Words{});
 }
 
@@ -222,7 +254,7 @@ TEST_F(Commands, ASetThatContradictsItselfIsRefusedAsAWhole) {
 }
 
 TEST_F(Commands, AnotherProtocolIsSaidSo) {
-  board_->protocol = 2;
+  board_->protocol = wire::protocol_version + 1;
   refused("get", 9, "use a newer hotcore");
   board_->protocol = 0;
   refused("get", 9, "update the firmware");
@@ -334,7 +366,7 @@ TEST_F(Commands, FilesThatAreWrongAreNamed) {
 }
 
 TEST_F(Commands, WrongCommandLinesGetOneSentence) {
-  refused("run \"5 bananas\"", 2, "no piece of a current profile");
+  refused("run \"5 bananas\"", 2, "no piece of a course");
   refused("run \"5A\"", 2, "no piece");
   refused("ask \"5A -1s\"", 2, "no piece");
   refused("arm --axis 2", 2, "--axis");
@@ -354,7 +386,7 @@ TEST_F(Commands, WithJsonAnErrorIsJsonToo) {
 TEST(Profile, UnitsAreUnderstood) {
   const auto pieces = console::profile_in("20A 0.3s, -500mA 200 ms,6 2min", 10);
   ASSERT_EQ(pieces.size(), 3u);
-  EXPECT_FLOAT_EQ(pieces[1].current_A, -0.5f);
+  EXPECT_FLOAT_EQ(pieces[1].level, -0.5f);
   EXPECT_FLOAT_EQ(pieces[1].seconds, 0.2f);
   EXPECT_FLOAT_EQ(pieces[2].seconds, 120.0f);
 }

@@ -44,6 +44,7 @@ struct FakeBoard {
   Values in_force, staged, saved;
   std::uint8_t armed = 0;
   int saves = 0, setpoints = 0;
+  wire::ControlMode control[wire::axis_count]{};
   bool unplugged = false;
   std::uint8_t fault = 0;
   float temperature_degC = 30.0f;
@@ -110,6 +111,8 @@ struct FakeBoard {
       wire::AxisReport& axis = s.axis[a];
       axis.mode = (armed >> a & 1) != 0 ? 2 : fault != 0 ? 3 : 0;
       axis.fault = fault;
+      axis.refused = refused_[a];
+      axis.control = control[a];
       axis.iq_A = asked_A_[a];
       axis.core_degC = temperature_degC;
       axis.core_sigma_K = 1.5f;
@@ -221,11 +224,26 @@ struct FakeBoard {
         evidence = {};
         add(payload, verdict);
         break;
+      case wire::Kind::mode: {
+        wire::ChooseMode wish{};
+        (void)wire::read(frame.payload, frame.bytes, wish);
+        if ((armed & wish.mask) != 0) verdict = {static_cast<std::uint8_t>(wire::Status::mode_in_use), 0, 0};
+        for (int a = 0; a < wire::axis_count && verdict.status == 0; ++a) {
+          if ((wish.mask >> a & 1) != 0) control[a] = wish.mode;
+        }
+        add(payload, verdict);
+        break;
+      }
       case wire::Kind::setpoint: {
         wire::Setpoints asked{};
         (void)wire::read(frame.payload, frame.bytes, asked);
         for (int a = 0; a < wire::axis_count; ++a) {
-          if ((asked.mask >> a & 1) != 0) asked_A_[a] = asked.iq_A[a];
+          refused_[a] = 0;
+          if ((asked.mask >> a & 1) == 0) continue;
+          if (asked.mode[a] != control[a])
+            refused_[a] = static_cast<std::uint8_t>(wire::Status::other_mode);
+          else
+            asked_A_[a] = asked.q[a];
         }
         ++setpoints;
         add(payload, state());
@@ -295,6 +313,7 @@ struct FakeBoard {
     Bytes payload;
   } held_;
   float asked_A_[wire::axis_count]{};
+  std::uint8_t refused_[wire::axis_count]{};
   std::vector<wire::SignalAddress> watched_;
   std::uint16_t decimation_ = 1;
   double next_row_s_ = 0;

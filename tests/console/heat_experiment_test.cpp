@@ -53,7 +53,7 @@ TEST(HeatExperiment, TheCourseHasItsLengthAndNoBurstBeyondItsShare) {
   double length_s = 0, most_A = 0;
   for (const auto& piece : console::designed_course(4.0, 17)) {
     length_s += double{piece.seconds};
-    most_A = std::max(most_A, double{piece.current_A});
+    most_A = std::max(most_A, double{piece.level});
   }
   EXPECT_NEAR(length_s, 17 * 60, 1e-3);
   EXPECT_DOUBLE_EQ(most_A, 10.0);

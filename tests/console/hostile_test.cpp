@@ -192,7 +192,7 @@ TEST(HostileText, AProfileIsReadOrRefused) {
       text.insert(dice.below(text.size() + 1), 1, letters[dice.below(letters.size())]);
     try {
       for (const console::Piece& piece : console::profile_in(text, 4))
-        ASSERT_TRUE(std::isfinite(piece.current_A) && piece.seconds > 0) << text;
+        ASSERT_TRUE(std::isfinite(piece.level) && piece.seconds > 0) << text;
       ++read;
     } catch (const wire::pc::UserError& error) {
       ASSERT_EQ(error.exit_code(), 2);

@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
     for (const auto& board : boards) {
       const double due_s = board->now_s() + 0.005;
       const float iq_A = tick / 100 % 2 == 0 ? 1.0f : -1.0f;
-      const double took_s = exchange(*board, {3, {}, {0, 0}, {iq_A, iq_A}});
+      const double took_s = exchange(*board, {3, {}, 0, {0, 0}, {iq_A, iq_A}});
       took_s < 0 ? ++lost : ++by_periods[static_cast<int>(took_s * 20000 + 0.5)];
       while (board->now_s() < due_s - 1e-6) board->wait(std::max(1, static_cast<int>((due_s - board->now_s()) * 1e3)));
     }
@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
   int exchanges = 0;
   Board& one = *boards.front();
   const double start_s = one.now_s();
-  while (one.now_s() < start_s + 1.0) exchanges += exchange(one, {3, {}, {0, 0}, {0, 0}}) >= 0;
+  while (one.now_s() < start_s + 1.0) exchanges += exchange(one, {3, {}, 0, {0, 0}, {0, 0}}) >= 0;
   fmt::print("One board as fast as it goes: {} exchanges a second\n", exchanges);
   return lost == 0 ? 0 : 1;
 }

@@ -605,6 +605,82 @@ TEST(Axis, LearnsNothingFromAMotorThatIsDrivenByHand) {
 
 // ---- setting up -----------------------------------------------------------------------------------------------------
 
+// ---- control mode ---------------------------------------------------------------------------------------------------
+
+TEST(Axis, TorqueModeMakesTheTorqueThatWasAskedFor) {
+  Rig rig;
+  rig.run(2400);
+  ASSERT_EQ(rig.axis().control(), wire::ControlMode::current) << "every start";
+  EXPECT_EQ(rig.axis().set_torque(0.0f, 0.1f), Status::other_mode);
+  ASSERT_EQ(rig.axis().choose(wire::ControlMode::torque), Status::done);
+  EXPECT_EQ(rig.axis().set_current({0.0f, 1.0f}), Status::other_mode);
+  ASSERT_EQ(rig.axis().arm(), Status::done);
+  EXPECT_EQ(rig.axis().choose(wire::ControlMode::current), Status::mode_in_use) << "posted is as good as armed";
+  rig.run(1);
+  const auto settle = [&](float torque_Nm) {
+    for (int i = 0; i < 2000; i += 100) {
+      ASSERT_EQ(rig.axis().set_torque(0.0f, torque_Nm), Status::done);
+      rig.run(100);
+    }
+  };
+  for (const float torque_Nm : {0.05f, -0.12f}) {
+    settle(torque_Nm);
+    EXPECT_EQ(rig.axis().mode(), Mode::running);
+    EXPECT_EQ(rig.axis().choose(wire::ControlMode::current), Status::mode_in_use);
+    // The sheet's 27.6 mN m/A is of line current; per ampere of amplitude it is sqrt(3)/2 of that.
+    const double made_Nm = rig.motor.iq_A * 27.6e-3 * std::sqrt(3.0) / 2;
+    EXPECT_NEAR(made_Nm, static_cast<double>(torque_Nm), 0.02 * 0.12) << rig.motor.iq_A;
+  }
+}
+
+/// More than anybody allows is cut to what is allowed, in amperes: a limit taken before the conversion would let
+/// 1 / 0.024 times as much through.
+TEST(Axis, InTorqueModeEveryLimitIsOneOfCurrent) {
+  Rig rig;
+  rig.run(2400);
+  ASSERT_EQ(rig.axis().choose(wire::ControlMode::torque), Status::done);
+  ASSERT_EQ(rig.axis().arm(), Status::done);
+  rig.run(1);
+  float most_A = 0.0f;
+  for (int i = 0; i < 4000; ++i) {
+    ASSERT_EQ(rig.axis().set_torque(0.0f, 10.0f), Status::done);  // 418 A
+    rig.run(1);
+    most_A = std::max(most_A, std::hypot(rig.axis().fast().permitted_A.d, rig.axis().fast().permitted_A.q));
+    ASSERT_LE(most_A, bench::rating.peak_A);
+    ASSERT_LE(rig.axis().fast().permitted_A.q, rig.axis().state().allowance_A + bench::rating.peak_A * 0.02f);
+  }
+  EXPECT_GT(most_A, 0.9f * bench::rating.peak_A);
+  EXPECT_NE(rig.axis().fast().limit, wire::Limit::none);
+  const wire::Dq before = rig.axis().fast().permitted_A;
+  for (const float torque_Nm : {std::nanf(""), INFINITY, 25.0f}) {  // the last one: beyond 1000 A
+    EXPECT_EQ(rig.axis().set_torque(0.0f, torque_Nm), Status::not_a_current);
+  }
+  EXPECT_EQ(rig.axis().set_torque(std::nanf(""), 0.01f), Status::not_a_current);
+  rig.run(1);
+  EXPECT_NEAR(rig.axis().fast().permitted_A.q, before.q, 1.0f) << "what is refused changes nothing";
+}
+
+TEST(Axis, WithoutAFluxLinkageThereIsNoTorqueMode) {
+  for (const float flux_Wb : {firmware::unset, 0.0f}) {
+    firmware::DriverSetup setup = bench::driver_setup();
+    setup.axes[0].parameters.flux_linkage_Wb = flux_Wb;
+    firmware::Driver driver(setup);
+    (void)driver.axis(0).tick(bench::quiet_sample(1));
+    EXPECT_EQ(driver.axis(0).choose(wire::ControlMode::torque), Status::parameters_unset) << flux_Wb;
+    EXPECT_EQ(driver.axis(0).control(), wire::ControlMode::current);
+  }
+  // Taken back while torque mode stands: nothing is asked for any more, not even zero.
+  Rig rig;
+  rig.run(2400);
+  ASSERT_EQ(rig.axis().choose(wire::ControlMode::torque), Status::done);
+  firmware::AxisSetup setup = bench::axis_setup();
+  setup.parameters.flux_linkage_Wb = firmware::unset;
+  rig.driver.configure(0, setup, firmware::HeatModel::unchanged);
+  rig.run(1);
+  EXPECT_EQ(rig.axis().set_torque(0.0f, 0.0f), Status::not_a_current);
+  EXPECT_EQ(rig.axis().arm(), Status::parameters_unset);
+}
+
 TEST(Axis, AnIncompleteSetRefusesToArm) {
   firmware::DriverSetup setup = bench::driver_setup();
   setup.axes[0].parameters.flux_linkage_Wb = wire::unset;

@@ -27,7 +27,7 @@ struct Linked : testing::Test {
     board.advance(2);
   }
   static Bytes setpoint(std::uint8_t mask, float iq_0, float iq_1 = 0.0f) {
-    return bytes_of(wire::Setpoints{mask, {}, {0, 0}, {iq_0, iq_1}});
+    return bytes_of(wire::Setpoints{mask, {}, 0, {0, 0}, {iq_0, iq_1}});
   }
   wire::State set(std::uint8_t mask, float iq_0, float iq_1 = 0.0f) {
     return program.call_for<wire::State>(Kind::setpoint, setpoint(mask, iq_0, iq_1));

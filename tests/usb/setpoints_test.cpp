@@ -51,6 +51,44 @@ TEST_F(Linked, BothAxesFollowTheirOwnSetpoints) {
   EXPECT_GT(later.period, state.period);
 }
 
+TEST_F(Linked, TheControlModeIsChosenByACommandAndReported) {
+  const auto choose = [&](std::uint8_t mask, int mode) {
+    return program.status(Kind::mode, {mask, static_cast<std::uint8_t>(mode)});
+  };
+  EXPECT_EQ(choose(3, 2), number(Status::out_of_range));
+  EXPECT_EQ(choose(4, 1), number(Status::no_such_axis));
+  EXPECT_EQ(choose(0, 1), number(Status::no_such_axis));
+  arm(1);
+  EXPECT_EQ(choose(3, 1), number(Status::mode_in_use));
+  EXPECT_EQ(axis(1).control(), wire::ControlMode::current) << "all of them or none";
+  EXPECT_EQ(choose(2, 1), 0);
+  arm(2);
+  wire::Setpoints wish{3, {wire::ControlMode::current, wire::ControlMode::torque}, 0, {0, 0}, {2.0f, 0.072f}};
+  wire::State state{};
+  for (int k = 0; k < 30; ++k) state = program.call_for<wire::State>(Kind::setpoint, bytes_of(wish)), program.pass(20);
+  EXPECT_EQ(state.axis[0].control, wire::ControlMode::current);
+  EXPECT_EQ(state.axis[1].control, wire::ControlMode::torque);
+  EXPECT_NEAR(state.axis[0].iq_A, 2.0f, 0.2f);
+  EXPECT_NEAR(state.axis[1].iq_A, 0.072 / (27.6e-3 * std::sqrt(3.0) / 2), 0.2);  // the sheet's, per ampere of amplitude
+  // Amperes where newton metres are expected, and the other way round, feed nobody.
+  std::swap(wish.mode[0], wish.mode[1]);
+  for (int k = 0; k < 400; ++k) {
+    state = program.call_for<wire::State>(Kind::setpoint, bytes_of(wish));
+    EXPECT_EQ(state.axis[0].refused, number(Status::other_mode));
+    EXPECT_EQ(state.axis[1].refused, number(Status::other_mode));
+    program.pass(20);
+  }
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::ready);
+  EXPECT_EQ(axis(1).mode(), firmware::Mode::ready);
+}
+
+TEST_F(Linked, EveryStartBeginsWithCurrent) {
+  ASSERT_EQ(program.status(Kind::mode, {3, 1}), 0);
+  board.power_cycle();
+  EXPECT_EQ(axis(0).control(), wire::ControlMode::current);
+  EXPECT_EQ(axis(1).control(), wire::ControlMode::current);
+}
+
 TEST_F(Linked, OneAxisFedDoesNotKeepTheOtherAlive) {
   arm(3);
   for (int k = 0; k < 10; ++k) set(3, 2.0f, 2.0f), program.pass(20);
