@@ -15,7 +15,7 @@ std::vector<Register> registers() {
   using O = OtgFs;
   std::vector<Register> map = {
       {O::gahbcfg, "OTG_FS_GAHBCFG", 0, 0x181, 0x181},
-      {O::gusbcfg, "OTG_FS_GUSBCFG", 0x00000A00, 0xE0003FC7, 0xE0003FC7},
+      {O::gusbcfg, "OTG_FS_GUSBCFG", 0x00000A40, 0xE0003FC7, 0xE0003F87},  // PHYSEL is read-only 1
       {O::grstctl, "OTG_FS_GRSTCTL", 0x80000000, 0x800007F7, 0},
       {O::gintsts, "OTG_FS_GINTSTS", 0x04000020, 0xF73CFCFF, 0},
       {O::gintmsk, "OTG_FS_GINTMSK", 0, 0xF73EFCFE, 0xF73EFCFE},

@@ -155,6 +155,13 @@ TEST_F(Otg, ReservedBitsAndUnknownRegistersAreMistakes) {
   EXPECT_TRUE(complains("does not exist"));
 }
 
+/// RM0090 Rev 21, 34.16.2: reset value 0x0000 0A40; PHYSEL (bit 6) is always 1 and read-only.
+TEST_F(Otg, TheTransceiverSelectIsAlwaysOne) {
+  EXPECT_EQ(read(otg + 0x00C), 0x0A40u);
+  write(otg + 0x00C, 0);
+  EXPECT_EQ(read(otg + 0x00C), 0x0040u);
+}
+
 TEST_F(Otg, ABusResetClosesEndpointsAndTheAddressIsTheFirmwaresToForget) {
   come_up();
   open_1();
