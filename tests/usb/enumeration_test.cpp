@@ -2,6 +2,8 @@
 // The device as hosts meet it: descriptors against byte tables of the specifications, the sequences of Linux and
 // Windows, and requests that must be refused.
 #include <gtest/gtest.h>
+#include <linux/usb/cdc.h>
+#include <linux/usb/ch9.h>
 
 #include <random>
 
@@ -65,6 +67,106 @@ TEST_F(Enumeration, ConfigurationDescriptorIsTheTableOfTheSpecification) {
   EXPECT_EQ(descriptor(configuration_type, 9), Bytes(expected.begin(), expected.begin() + 9));
 }
 
+/// The same bytes once more, by the names that Linux's public headers (linux/usb/ch9.h, cdc.h) give them: written by
+/// others after the same specifications, and what a Linux host reads them with.
+TEST_F(Enumeration, TheDescriptorsMeanTheSameToTheHeadersOfLinux) {
+  const auto read = [](const Bytes& bytes, std::size_t& at, auto& into) {
+    ASSERT_LE(at + sizeof into, bytes.size());
+    std::memcpy(&into, bytes.data() + at, sizeof into);
+    at += bytes[at];
+  };
+  std::size_t at = 0;
+  usb_device_descriptor device{};
+  read(*descriptor(device_type, 18), at, device);
+  EXPECT_EQ(device.bLength, USB_DT_DEVICE_SIZE);
+  EXPECT_EQ(device.bDescriptorType, USB_DT_DEVICE);
+  EXPECT_EQ(device.bcdUSB, 0x0201);
+  EXPECT_EQ(device.bDeviceClass, USB_CLASS_MISC);
+  EXPECT_EQ(device.bMaxPacketSize0, 64);
+  EXPECT_EQ(device.idVendor, wire::usb_vendor_id);
+  EXPECT_EQ(device.idProduct, wire::usb_product_id);
+  EXPECT_EQ(device.bNumConfigurations, 1);
+
+  const Bytes all = *descriptor(configuration_type, 255);
+  at = 0;
+  usb_config_descriptor configuration{};
+  std::memcpy(&configuration, all.data(), USB_DT_CONFIG_SIZE);
+  at += all[0];
+  EXPECT_EQ(configuration.bLength, USB_DT_CONFIG_SIZE);
+  EXPECT_EQ(configuration.bDescriptorType, USB_DT_CONFIG);
+  EXPECT_EQ(configuration.wTotalLength, all.size());
+  EXPECT_EQ(configuration.bNumInterfaces, 3);
+  EXPECT_EQ(configuration.bmAttributes, USB_CONFIG_ATT_ONE | USB_CONFIG_ATT_SELFPOWER);
+
+  const auto interface = [&](int number, int endpoints, int type) {
+    usb_interface_descriptor i{};
+    read(all, at, i);
+    EXPECT_EQ(i.bLength, USB_DT_INTERFACE_SIZE);
+    EXPECT_EQ(i.bDescriptorType, USB_DT_INTERFACE);
+    EXPECT_EQ(i.bInterfaceNumber, number);
+    EXPECT_EQ(i.bAlternateSetting, 0);
+    EXPECT_EQ(i.bNumEndpoints, endpoints);
+    EXPECT_EQ(i.bInterfaceClass, type);
+  };
+  const auto endpoint = [&](int number, int kind, int bytes) {
+    usb_endpoint_descriptor e{};
+    ASSERT_LE(at + USB_DT_ENDPOINT_SIZE, all.size());
+    std::memcpy(&e, all.data() + at, USB_DT_ENDPOINT_SIZE);
+    at += all[at];
+    EXPECT_EQ(e.bLength, USB_DT_ENDPOINT_SIZE);
+    EXPECT_EQ(e.bDescriptorType, USB_DT_ENDPOINT);
+    EXPECT_EQ(e.bEndpointAddress, number);
+    EXPECT_EQ(e.bmAttributes & USB_ENDPOINT_XFERTYPE_MASK, kind);
+    EXPECT_EQ(e.wMaxPacketSize, bytes);
+  };
+  interface(0, 2, USB_CLASS_VENDOR_SPEC);
+  endpoint(0x01, USB_ENDPOINT_XFER_BULK, 64);
+  endpoint(0x81, USB_ENDPOINT_XFER_BULK, 64);
+  usb_interface_assoc_descriptor association{};
+  read(all, at, association);
+  EXPECT_EQ(association.bDescriptorType, USB_DT_INTERFACE_ASSOCIATION);
+  EXPECT_EQ(association.bFirstInterface, 1);
+  EXPECT_EQ(association.bInterfaceCount, 2);
+  EXPECT_EQ(association.bFunctionClass, USB_CLASS_COMM);
+  EXPECT_EQ(association.bFunctionSubClass, USB_CDC_SUBCLASS_ACM);
+  interface(1, 1, USB_CLASS_COMM);
+  usb_cdc_header_desc header{};
+  read(all, at, header);
+  EXPECT_EQ(header.bDescriptorSubType, USB_CDC_HEADER_TYPE);
+  EXPECT_EQ(header.bcdCDC, 0x0120);
+  usb_cdc_call_mgmt_descriptor calls{};
+  read(all, at, calls);
+  EXPECT_EQ(calls.bDescriptorSubType, USB_CDC_CALL_MANAGEMENT_TYPE);
+  EXPECT_EQ(calls.bDataInterface, 2);
+  usb_cdc_acm_descriptor acm{};
+  read(all, at, acm);
+  EXPECT_EQ(acm.bDescriptorSubType, USB_CDC_ACM_TYPE);
+  EXPECT_EQ(acm.bmCapabilities, USB_CDC_CAP_LINE);
+  usb_cdc_union_desc both{};
+  read(all, at, both);
+  EXPECT_EQ(both.bDescriptorSubType, USB_CDC_UNION_TYPE);
+  EXPECT_EQ(both.bMasterInterface0, 1);
+  EXPECT_EQ(both.bSlaveInterface0, 2);
+  endpoint(0x82, USB_ENDPOINT_XFER_INT, 8);
+  interface(2, 2, USB_CLASS_CDC_DATA);
+  endpoint(0x03, USB_ENDPOINT_XFER_BULK, 64);
+  endpoint(0x83, USB_ENDPOINT_XFER_BULK, 64);
+  EXPECT_EQ(at, all.size());
+
+  const Bytes bos = *descriptor(bos_type, 255);
+  at = 0;
+  usb_bos_descriptor store{};
+  read(bos, at, store);
+  EXPECT_EQ(store.bDescriptorType, USB_DT_BOS);
+  EXPECT_EQ(store.wTotalLength, bos.size());
+  EXPECT_EQ(store.bNumDeviceCaps, 1);
+  usb_dev_cap_header platform{};
+  read(bos, at, platform);
+  EXPECT_EQ(platform.bDescriptorType, USB_DT_DEVICE_CAPABILITY);
+  EXPECT_EQ(platform.bDevCapabilityType, 5) << "platform: named only by later headers than 6.1";
+  EXPECT_EQ(at, bos.size());
+}
+
 // Microsoft OS 2.0 Descriptors Specification (July 2018), tables 4 and 5; 0x06030000 is Windows 8.1. But for length and
 // vendor code the same bytes as in Zephyr's sample of a CMSIS-DAP and in a capture from a Blue Pill with WebUSB.
 TEST_F(Enumeration, BosNamesTheMicrosoftSet) {
@@ -74,7 +176,8 @@ TEST_F(Enumeration, BosNamesTheMicrosoftSet) {
                    0x9E, 0x64, 0x8A, 0x9F, 0x00, 0x00, 0x03, 0x06, 0xB2, 0x00, 0x20, 0x00}));
 }
 
-// The same, tables 9 to 15; type 7 is REG_MULTI_SZ. A name of 42 and one GUID of 80 bytes, as in Zephyr's sample.
+// The same, tables 9 to 15; type 7 is REG_MULTI_SZ. Types, lengths and order of fields as in two public transcripts of
+// them, Zephyr's msos_desc.h and libusbK's libusbk.h. A name of 42 and one GUID of 80 bytes, as in Zephyr's sample.
 TEST_F(Enumeration, MicrosoftSetIsTheTableOfTheSpecification) {
   Bytes expected{0x0A, 0, 0, 0, 0x00, 0x00, 0x03, 0x06, 0xB2, 0,                                  //
                  0x08, 0, 1, 0, 0,    0,    0xA8, 0,                                              //
