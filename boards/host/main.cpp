@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #ifdef HOTCORE_TRAP_FLOATS
@@ -130,15 +131,21 @@ void record_log(RecordOptions options, const std::string& out, bool json) {
   }
 }
 
-void list() {
-  fmt::print("Scenes ({}):\n", scene_folder);
-  for (const std::string& name : scene_names(scene_folder))
-    fmt::print("  {:<16}{}\n", name, read_scene(name, scene_folder, {}).title);
-  fmt::print("Motors ({}):\n", motor_folder);
+void list(bool json) {
+  nlohmann::ordered_json all;
+  std::string text = fmt::format("Scenes ({}):\n", scene_folder);
+  for (const std::string& name : scene_names(scene_folder)) {
+    const std::string title = read_scene(name, scene_folder, {}).title;
+    text += fmt::format("  {:<16}{}\n", name, title);
+    all["scenes"].push_back({{"name", name}, {"title", title}});
+  }
+  text += fmt::format("Motors ({}):\n", motor_folder);
   for (const std::string& name : wire::pc::motor_names(motor_folder)) {
     const wire::pc::MotorFile file = wire::pc::read_motor(name, motor_folder);
-    fmt::print("  {:<24}{}{}\n", name, file.name, file.surrogate ? " (surrogate)" : "");
+    text += fmt::format("  {:<24}{}{}\n", name, file.name, file.surrogate ? " (surrogate)" : "");
+    all["motors"].push_back({{"name", name}, {"title", file.name}, {"surrogate", file.surrogate}});
   }
+  fmt::print("{}", json ? all.dump() + "\n" : text);
 }
 
 }  // namespace
@@ -163,6 +170,7 @@ int main(int argc, char** argv) {
   run_command->add_flag("--json", json, "the summary as JSON on standard output");
 
   CLI::App* list_command = app.add_subcommand("list", "scenes and motors");
+  list_command->add_flag("--json", json, "as JSON on standard output");
 
   CLI::App* figures_command = app.add_subcommand("figures", "the paper's figures and tables, computed anew");
   figures_command->add_option("--out", out, "folder for the pictures")->capture_default_str();
@@ -190,7 +198,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (*run_command) run(scene, overrides, seed_of(hide), out, json);
-    if (*list_command) list();
+    if (*list_command) list(json);
     if (*record_command) {
       recording.hide = seed_of(hide);
       record_log(recording, out, json);

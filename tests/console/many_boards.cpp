@@ -4,12 +4,14 @@
 // simulated second costs so many CPU seconds), and the round trip of setpoint and state as a histogram in the boards'
 // own time.
 //
-//   many_boards [BOARDS] [SECONDS]
+//   many_boards [BOARDS] [SECONDS] [--json]
 #include <fmt/format.h>
 
 #include <ctime>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <string_view>
 #include <vector>
 
 #include "console/link/board.hpp"
@@ -52,6 +54,8 @@ double exchange(Board& board, const wire::Setpoints& setpoints) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool json = argc > 1 && std::string_view(argv[argc - 1]) == "--json";
+  argc -= json ? 1 : 0;
   const int count = argc > 1 ? std::atoi(argv[1]) : 64;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 5.0;
   std::vector<std::unique_ptr<Board>> boards;
@@ -75,6 +79,22 @@ int main(int argc, char** argv) {
     }
   }
   const double share = (cpu_s() - cpu_start_s) / seconds;
+  int exchanges = 0;
+  Board& one = *boards.front();
+  const double start_s = one.now_s();
+  while (one.now_s() < start_s + 1.0) exchanges += exchange(one, {3, {}, 0, {0, 0}, {0, 0}}) >= 0;
+
+  if (json) {
+    nlohmann::ordered_json histogram;
+    for (const auto& [periods, n] : by_periods) histogram[fmt::format("{:.2f}", periods * 0.05)] = n;
+    fmt::print("{}\n", nlohmann::ordered_json{{"boards", count},
+                                              {"cpu_share", share},
+                                              {"lost", lost},
+                                              {"round_trip_ms", histogram},
+                                              {"exchanges_per_s_of_one", exchanges}}
+                           .dump());
+    return lost == 0 ? 0 : 1;
+  }
   fmt::print(
       "{} boards, 200 setpoints and states a second each: {:.0f} % of one CPU ({:.2f} % a board), {} exchanges lost\n",
       count, 100 * share, 100 * share / count, lost);
@@ -83,11 +103,6 @@ int main(int argc, char** argv) {
   for (const auto& [periods, n] : by_periods)
     fmt::print("  {:5.2f} ms {:8d} {}\n", periods * 0.05, n,
                std::string(static_cast<std::size_t>(1 + 60 * n / total), '#'));
-
-  int exchanges = 0;
-  Board& one = *boards.front();
-  const double start_s = one.now_s();
-  while (one.now_s() < start_s + 1.0) exchanges += exchange(one, {3, {}, 0, {0, 0}, {0, 0}}) >= 0;
   fmt::print("One board as fast as it goes: {} exchanges a second\n", exchanges);
   return lost == 0 ? 0 : 1;
 }

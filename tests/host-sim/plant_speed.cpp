@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Prints what the plant costs: CPU nanoseconds per axis and PWM period in both bridges, and per long log of heat alone.
-// A program, not a test: figures of a clock prove nothing in a test run.
+// A program, not a test: figures of a clock prove nothing in a test run. --json: one object a line.
 #include <cstdio>
 #include <ctime>
+#include <string_view>
 
 #include "host-sim/plant/thermal_bench.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
@@ -13,7 +14,8 @@ double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  const bool json = argc > 1 && std::string_view(argv[1]) == "--json";
   for (const char* id : {"ec-16-40w", "ec-powermax-30-24v"}) {
     for (const bool switched : {false, true}) {
       host_sim::BenchDesign design = plant_tests::bench_design(plant_tests::sheet(id));
@@ -36,14 +38,17 @@ int main() {
       }
       const double took_s = cpu_s() - start_s;
       std::printf(
-          "%-20s %-8s bridge: %6.0f ns per axis and period, %6.1f simulated seconds per CPU second (two axes)\n", id,
-          switched ? "switched" : "averaged", took_s / periods / 2 * 1e9, bench.time_s() / took_s);
+          json ? "{\"motor\":\"%s\",\"bridge\":\"%s\",\"ns_per_axis_and_period\":%.0f,\"simulated_s_per_cpu_s\":%.1f}\n"
+               : "%-20s %-8s bridge: %6.0f ns per axis and period, %6.1f simulated seconds per CPU second (two axes)\n",
+          id, switched ? "switched" : "averaged", took_s / periods / 2 * 1e9, bench.time_s() / took_s);
     }
     host_sim::ThermalDesign design;
     design.sheet = plant_tests::sheet(id);
     const auto demands = host_sim::make_excitation(host_sim::Excitation::robot_duty, design.sheet, 2000, 1200, 20, 1);
     const double start_s = cpu_s();
     for (int n = 0; n < 20; ++n) host_sim::record(design, demands, 20, 10, 1);
-    std::printf("%-20s heat alone, 20 min at 20 Hz, logged at 10 Hz: %.1f ms\n", id, (cpu_s() - start_s) / 20 * 1e3);
+    std::printf(json ? "{\"motor\":\"%s\",\"heat_alone_20_min_ms\":%.1f}\n"
+                     : "%-20s heat alone, 20 min at 20 Hz, logged at 10 Hz: %.1f ms\n",
+                id, (cpu_s() - start_s) / 20 * 1e3);
   }
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Prints how long the four-parameter fit takes on one core (CPU time, after the logs are read): a benchmark, not a
 // test.
-//   build/host/bin/fit_speed
+//   build/host/bin/fit_speed [--json]
 #include <fmt/format.h>
 
 #include <ctime>
+#include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "identify/fit.hpp"
 #include "identify/table.hpp"
@@ -15,7 +17,7 @@ namespace {
 
 double cpu_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-void measure(const char* what, double seconds, double rate_Hz, double core_every_s) {
+void measure(const char* what, double seconds, double rate_Hz, double core_every_s, bool json) {
   tests::BenchOptions options;
   options.seconds = seconds;
   options.rate_Hz = rate_Hz;
@@ -29,6 +31,17 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   const double t1 = cpu_ms();
   const identify::Fit f = identify::fit(problem, {});
   const double t2 = cpu_ms();
+  if (json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"log", what},
+                                              {"fit_ms", t2 - t1},
+                                              {"binning_ms", t1 - t0},
+                                              {"rows", table.rows()},
+                                              {"bins", problem.logs[0].bins.size()},
+                                              {"iterations", f.iterations},
+                                              {"settled", f.settled}}
+                           .dump());
+    return;
+  }
   fmt::print("{}: fit {:.1f} ms, binning {:.1f} ms ({} rows, {} bins of {:.1f} s, {} iterations, {})\n", what, t2 - t1,
              t1 - t0, table.rows(), problem.logs[0].bins.size(), problem.logs[0].width_s, f.iterations,
              f.settled ? "settled" : "NOT settled");
@@ -36,7 +49,8 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
 
 }  // namespace
 
-int main() {
-  measure("30 min at 10 Hz, housing and sparse winding", 1800, 10, 30);
-  measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30);
+int main(int argc, char** argv) {
+  const bool json = argc > 1 && std::string_view(argv[1]) == "--json";
+  measure("30 min at 10 Hz, housing and sparse winding", 1800, 10, 30, json);
+  measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
 }

@@ -14,12 +14,12 @@ namespace {
 
 const std::string root = HOTCORE_SOURCE_DIR;
 
-int run(const std::string& scene, const std::string& elf, std::uint16_t port) {
+int run(const std::string& scene, const std::string& elf, std::uint16_t port, bool json) {
   using namespace boards;
   const auto pcb = board_of(host::read_scene(scene, root + "/host-sim/scenes", {}), elf, root + "/boards/motors");
   pcb->power_on();
   Cable cable(*pcb);
-  const int code = usb::serve_until_interrupted(cable, port);
+  const int code = usb::serve_until_interrupted(cable, port, json);
   if (pcb->chip.troubles().count() == 0) return code;
   fmt::print(stderr, "{}", pcb->chip.report_text());
   return 3;
@@ -39,12 +39,14 @@ int main(int argc, char** argv) {
       "virtual-chip"};
   std::string elf = root + "/build/h8-15d/bin/h8-15d.elf", scene = "jump";
   std::uint16_t port = boards::usb::usbip_port;
+  bool json = false;
   app.add_option("--scene", scene, "motors, shafts and supply of this scene of host-sim")->capture_default_str();
   app.add_option("--image", elf, "the flash image")->capture_default_str();
   app.add_option("--port", port, "TCP port on loopback")->capture_default_str();
+  app.add_flag("--json", json, "say where it is served in one line of JSON");
   try {
     app.parse(argc, argv);
-    return run(scene, elf, port);
+    return run(scene, elf, port, json);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const wire::pc::UserError& error) {

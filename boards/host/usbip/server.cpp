@@ -16,6 +16,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "wire/pc/user_error.hpp"
 
@@ -299,13 +300,20 @@ namespace {
 volatile std::sig_atomic_t interrupted = 0, power_cut = 0;
 }
 
-int serve_until_interrupted(Device& device, std::uint16_t port) {
+int serve_until_interrupted(Device& device, std::uint16_t port, bool json) {
   Server server(device, port);
   const std::string where = server.port() == usbip_port ? "" : fmt::format("--tcp-port {} ", server.port());
-  fmt::print(
-      "A board is served on 127.0.0.1:{} (USB/IP). To attach it to this PC (package usbip, as root):\n"
-      "  modprobe vhci-hcd && usbip {}attach -r 127.0.0.1 -b {}\nCtrl-C pulls the cable and ends.\n",
-      server.port(), where, bus_id);
+  const std::string attach = fmt::format("modprobe vhci-hcd && usbip {}attach -r 127.0.0.1 -b {}", where, bus_id);
+  if (json) {
+    const nlohmann::ordered_json served = {{"serial", server.serial()}, {"bus_id", bus_id}, {"host", "127.0.0.1"},
+                                           {"port", server.port()},     {"attach", attach}};
+    fmt::print("{}\n", served.dump());
+  } else {
+    fmt::print(
+        "Board {} is served on 127.0.0.1:{} (USB/IP). To attach it to this PC (package usbip, as root):\n"
+        "  {}\nCtrl-C pulls the cable and ends.\n",
+        server.serial(), server.port(), attach);
+  }
   std::fflush(stdout);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
   std::signal(SIGHUP, [](int) { power_cut = 1; });

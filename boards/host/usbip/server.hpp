@@ -29,6 +29,7 @@ class Server {
   /// In real time, or as fast as the device can if that is slower, until `stop` says so (asked every few ms).
   void serve(const std::function<bool()>& stop);
   std::uint16_t port() const;
+  const std::string& serial() const { return transfers_.serial(); }
 
  private:
   struct Client {
@@ -57,8 +58,8 @@ class Server {
   std::list<Client> clients_;
 };
 
-/// What a program around a server does: says how to attach, serves until Ctrl-C, returns its exit code. A SIGHUP cuts
-/// the device's power for a moment.
-int serve_until_interrupted(Device& device, std::uint16_t port);
+/// What a program around a server does: says how to attach (`json`: in one line of it), serves until Ctrl-C, returns its
+/// exit code. A SIGHUP cuts the device's power for a moment.
+int serve_until_interrupted(Device& device, std::uint16_t port, bool json);
 
 }  // namespace boards::usb

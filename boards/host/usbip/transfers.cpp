@@ -199,6 +199,14 @@ bool Transfers::enumerate() {
   const Transfer configuration = control(0x80, 6, 0x0200, 0, word(head.bytes, 2));
   device_descriptor_ = device.bytes;
   configuration_descriptor_ = configuration.bytes;
+  serial_.clear();
+  if (const std::uint8_t text = device.bytes[16]; text != 0) {  // iSerialNumber, USB 2.0 table 9-8
+    const Transfer serial = control(0x80, 6, static_cast<std::uint16_t>(0x0300 | text), 0x0409, 255);
+    for (std::size_t i = 2; i + 1 < serial.bytes.size(); i += 2) {
+      const std::uint16_t letter = word(serial.bytes, i);
+      serial_ += letter >= ' ' && letter <= '~' ? static_cast<char>(letter) : '?';
+    }
+  }
   return configuration.bytes.size() == word(head.bytes, 2);
 }
 

@@ -28,7 +28,7 @@ class Transfers {
  public:
   explicit Transfers(Device& device) : device_(device) {}
 
-  /// Bus reset, address 1, device and configuration descriptors. False: nobody answers as a USB device does.
+  /// Bus reset, address 1, device and configuration descriptors, serial number. False: nobody answers as a USB device does.
   bool enumerate();
   void forget();  // all that is under way; the cable was pulled
 
@@ -45,6 +45,8 @@ class Transfers {
 
   const std::vector<std::uint8_t>& device_descriptor() const { return device_descriptor_; }
   const std::vector<std::uint8_t>& configuration_descriptor() const { return configuration_descriptor_; }
+  /// Printable characters only; empty: the device has none.
+  const std::string& serial() const { return serial_; }
   double time_s() const { return time_s_; }
   std::uint64_t refused() const { return naks_; }
   /// Data packets whose toggle was not the expected one: a device that lost count.
@@ -75,6 +77,7 @@ class Transfers {
   std::map<int, bool> data1_;  // of each endpoint's next packet
   std::vector<Transfer> finished_early_;
   std::vector<std::uint8_t> device_descriptor_, configuration_descriptor_;
+  std::string serial_;
   double time_s_ = 0;
   std::uint64_t naks_ = 0, toggle_errors_ = 0;
 };

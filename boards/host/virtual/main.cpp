@@ -80,17 +80,19 @@ int main(int argc, char** argv) {
       "  virtual-board                 a board on USB/IP port 3240, until Ctrl-C\n"
       "  virtual-board --chip          the flash image on the chip model instead of the host build\n"
       "  virtual-board --port 0        any port that is free (it is printed)\n"
+      "  virtual-board --json          {\"serial\", \"bus_id\", \"host\", \"port\", \"attach\"} in one line, once it serves\n"
       "  kill -HUP PID                 its power goes and comes back\n"
       "Exit codes: 0 done, 2 the command line or a file is wrong, 6 the port is taken.\n"
       "A board that isn't there, as a USB device that a kernel can attach.\n",
       "virtual-board"};
   std::string motor = "ec-16-40w", serial = "SIM0";
   std::uint16_t port = usb::usbip_port;
-  bool chip = false;
+  bool chip = false, json = false;
   app.add_flag("--chip", chip, "the flash image on the chip model (virtual-chip --help)");
   app.add_option("--motor", motor, "on both axes; its parameters are set and saved")->capture_default_str();
   app.add_option("--serial", serial, "serial number")->capture_default_str();
   app.add_option("--port", port, "TCP port on loopback")->capture_default_str();
+  app.add_flag("--json", json, "say where it is served in one line of JSON");
   if (std::find(argv, argv + argc, std::string("--chip")) != argv + argc) return become_chip(argv);
   try {
     app.parse(argc, argv);
@@ -100,7 +102,7 @@ int main(int argc, char** argv) {
     options.full_motors = true;
     boards::host::VirtualBoard board(options);
     Cable cable(board);
-    return usb::serve_until_interrupted(cable, port);
+    return usb::serve_until_interrupted(cable, port, json);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const wire::pc::UserError& error) {
