@@ -71,12 +71,14 @@ const wire::Frame& Session::request(Kind kind, std::span<const std::uint8_t> pay
                                     double patience_s) {
   const double until_s = board_.now_s() + patience_s;
   std::optional<std::uint8_t> sequence;
-  while (!(sequence = board_.write(static_cast<std::uint8_t>(kind), payload))) {
-    if (board_.gone() || board_.now_s() > until_s) vanished(what);
-    board_.wait(10);
-  }
+  int restarts = board_.restarts();
   while (true) {
-    const wire::Frame* frame = read();
+    if (board_.restarts() != restarts) {  // question or answer may be lost: ask again
+      restarts = board_.restarts();
+      sequence.reset();
+    }
+    if (!sequence) sequence = board_.write(static_cast<std::uint8_t>(kind), payload);
+    const wire::Frame* frame = sequence ? read() : nullptr;
     if (frame == nullptr) {
       if (board_.gone() || board_.now_s() > until_s) vanished(what);
       board_.wait(10);
@@ -238,7 +240,7 @@ void Session::subscribe(const std::vector<Target>& signals, std::uint16_t decima
 
 void Session::unsubscribe() {
   request(Kind::subscribe, bytes_of(wire::Subscribe{1}), "end telemetry");
-  taker_ = {};
+  take_no_more();
 }
 
 void Session::capture(const wire::CaptureOrder& order, const std::vector<Target>& signals) {

@@ -27,6 +27,9 @@ class Transport {
   /// True from the moment at which the board was seen to be unplugged or to have failed. It does not come back: open
   /// anew.
   virtual bool gone() const = 0;
+  /// How often the board has refused what was under way and the stream was begun anew: what was written or asked for
+  /// before may be lost. Repeating a request is harmless.
+  virtual int restarts() const { return 0; }
 
  protected:
   Transport() = default;

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <optional>
 
+#include "console/link/ring.hpp"
 #include "wire/protocol.hpp"
 
 namespace console::link {
@@ -18,7 +19,7 @@ namespace {
 using wire::pc::Exit;
 using wire::pc::UserError;
 
-constexpr int in_transfers = 8, out_transfers = 8;
+constexpr std::size_t transfers_each_way = 8;
 constexpr int transfer_bytes = 512;  // whole packets of 64 B, and no frame is longer
 constexpr std::size_t ring_bytes = 1 << 16;
 
@@ -126,29 +127,30 @@ class UsbTransport final : public Transport {
  public:
   UsbTransport(libusb_context* context, libusb_device_handle* handle, const Endpoints& ends)
       : context_(context), handle_(handle), interface_(ends.interface) {
-    for (Slot& slot : in_) prepare(slot, ends.in, &arrived);
-    for (Slot& slot : out_) prepare(slot, ends.out, &sent);
+    prepare(in_, ends.in, &arrived);
+    prepare(out_, ends.out, &sent);
     listen();
   }
 
   ~UsbTransport() override {
     closing_ = true;
-    for (Slot* slot : slots()) {
-      if (slot->busy) libusb_cancel_transfer(slot->transfer);
-    }
+    cancel(in_);
+    cancel(out_);
     // Cancelled transfers come back within a frame; a kernel that keeps one for 2 s keeps its memory as well.
-    for (int i = 0; i < 200 && any_busy(); ++i) wait(10);
-    const bool all_back = !any_busy();
-    for (Slot* slot : slots()) {
-      if (!slot->busy) libusb_free_transfer(slot->transfer);
+    for (int i = 0; i < 200 && (busy(in_) || busy(out_)); ++i) wait(10);
+    const bool all_back = !busy(in_) && !busy(out_);
+    for (Pipe* pipe : {&in_, &out_}) {
+      for (Slot& slot : pipe->slots) {
+        if (!slot.busy) libusb_free_transfer(slot.transfer);
+      }
     }
     if (!gone_) libusb_release_interface(handle_, interface_);
     if (all_back) libusb_close(handle_);
   }
 
   bool write(std::span<const std::uint8_t> bytes) override {
-    for (Slot& slot : out_) {
-      if (slot.busy || gone_ || bytes.size() > slot.bytes.size()) continue;
+    for (Slot& slot : out_.slots) {
+      if (slot.busy || gone_ || out_.halted || bytes.size() > slot.bytes.size()) continue;
       std::memcpy(slot.bytes.data(), bytes.data(), bytes.size());
       slot.transfer->length = static_cast<int>(bytes.size());
       submit(slot);
@@ -158,10 +160,7 @@ class UsbTransport final : public Transport {
   }
 
   std::size_t read(std::span<std::uint8_t> room) override {
-    const std::size_t n = std::min(room.size(), filled_);
-    for (std::size_t i = 0; i < n; ++i) room[i] = ring_[(start_ + i) % ring_bytes];
-    start_ = (start_ + n) % ring_bytes;
-    filled_ -= n;
+    const std::size_t n = ring_.take(room);
     listen();
     return n;
   }
@@ -169,6 +168,8 @@ class UsbTransport final : public Transport {
   void wait(int milliseconds) override {
     timeval time{milliseconds / 1000, milliseconds % 1000 * 1000};
     libusb_handle_events_timeout_completed(context_, &time, nullptr);
+    lift(in_);
+    lift(out_);
   }
 
   double now_s() const override {
@@ -176,6 +177,7 @@ class UsbTransport final : public Transport {
   }
 
   bool gone() const override { return gone_; }
+  int restarts() const override { return stalls_; }
 
  private:
   struct Slot {
@@ -185,24 +187,30 @@ class UsbTransport final : public Transport {
     std::array<std::uint8_t, transfer_bytes> bytes;
   };
 
-  std::array<Slot*, in_transfers + out_transfers> slots() {
-    std::array<Slot*, in_transfers + out_transfers> all{};
-    std::size_t n = 0;
-    for (Slot& slot : in_) all[n++] = &slot;
-    for (Slot& slot : out_) all[n++] = &slot;
-    return all;
+  struct Pipe {
+    std::uint8_t endpoint = 0;
+    bool halted = false;  // and not yet lifted
+    std::array<Slot, transfers_each_way> slots;
+  };
+
+  static bool busy(const Pipe& pipe) {
+    return std::any_of(pipe.slots.begin(), pipe.slots.end(), [](const Slot& slot) { return slot.busy; });
   }
 
-  bool any_busy() {
-    const auto all = slots();
-    return std::any_of(all.begin(), all.end(), [](const Slot* slot) { return slot->busy; });
+  static void cancel(Pipe& pipe) {
+    for (Slot& slot : pipe.slots) {
+      if (slot.busy) libusb_cancel_transfer(slot.transfer);
+    }
   }
 
-  void prepare(Slot& slot, std::uint8_t endpoint, libusb_transfer_cb_fn done) {
-    slot.transfer = libusb_alloc_transfer(0);
-    if (slot.transfer == nullptr) throw std::bad_alloc();
-    slot.owner = this;
-    libusb_fill_bulk_transfer(slot.transfer, handle_, endpoint, slot.bytes.data(), transfer_bytes, done, &slot, 0);
+  void prepare(Pipe& pipe, std::uint8_t endpoint, libusb_transfer_cb_fn done) {
+    pipe.endpoint = endpoint;
+    for (Slot& slot : pipe.slots) {
+      slot.transfer = libusb_alloc_transfer(0);
+      if (slot.transfer == nullptr) throw std::bad_alloc();
+      slot.owner = this;
+      libusb_fill_bulk_transfer(slot.transfer, handle_, endpoint, slot.bytes.data(), transfer_bytes, done, &slot, 0);
+    }
   }
 
   void submit(Slot& slot) {
@@ -212,39 +220,53 @@ class UsbTransport final : public Transport {
 
   /// Asks for more, as much as the ring can take: a reader who sleeps slows the board down and loses nothing.
   void listen() {
-    std::size_t promised = filled_;
-    for (const Slot& slot : in_) promised += slot.busy ? transfer_bytes : 0;
-    for (Slot& slot : in_) {
-      if (slot.busy || gone_ || closing_ || promised + transfer_bytes > ring_bytes) continue;
+    std::size_t promised = ring_.size();
+    for (const Slot& slot : in_.slots) promised += slot.busy ? transfer_bytes : 0;
+    for (Slot& slot : in_.slots) {
+      if (slot.busy || gone_ || closing_ || in_.halted || promised + transfer_bytes > ring_bytes) continue;
       submit(slot);
       promised += transfer_bytes;
     }
   }
 
-  /// A transfer came back. A stall is the board's way to refuse; it is lifted once a transfer and the stream goes on.
-  void settle(Slot& slot) {
+  /// A transfer came back. A stall is the board's way to refuse: all that is under way there is taken back.
+  void settle(Pipe& pipe, Slot& slot) {
     slot.busy = false;
     const auto status = slot.transfer->status;
-    if (status == LIBUSB_TRANSFER_STALL && !closing_) {
-      gone_ = gone_ || ++stalls_ > most_stalls || libusb_clear_halt(handle_, slot.transfer->endpoint) != 0;
+    if (status == LIBUSB_TRANSFER_STALL) {
+      pipe.halted = true;
+      cancel(pipe);
     } else if (status != LIBUSB_TRANSFER_COMPLETED && status != LIBUSB_TRANSFER_CANCELLED) {
       gone_ = true;
     }
   }
 
+  /// Once nothing is under way there any more (libusb_clear_halt asks for that), and outside of callbacks. A delimiter
+  /// ends the frame that has arrived in part, there or here.
+  void lift(Pipe& pipe) {
+    if (!pipe.halted || closing_ || gone_ || busy(pipe)) return;
+    pipe.halted = false;
+    gone_ = ++stalls_ > most_stalls || libusb_clear_halt(handle_, pipe.endpoint) != 0;
+    constexpr std::uint8_t delimiter[] = {0};
+    if (&pipe == &out_)
+      write(delimiter);
+    else if (ring_.room() > 0)
+      ring_.put(delimiter);
+    listen();
+  }
+
   static void LIBUSB_CALL arrived(libusb_transfer* transfer) {
     Slot& slot = *static_cast<Slot*>(transfer->user_data);
     UsbTransport& self = *slot.owner;
-    self.settle(slot);
+    self.settle(self.in_, slot);
     const auto n = static_cast<std::size_t>(std::clamp(transfer->actual_length, 0, transfer_bytes));
-    for (std::size_t i = 0; i < n; ++i) self.ring_[(self.start_ + self.filled_ + i) % ring_bytes] = slot.bytes[i];
-    self.filled_ += n;
+    self.ring_.put(std::span(slot.bytes).first(n));
     self.listen();
   }
 
   static void LIBUSB_CALL sent(libusb_transfer* transfer) {
     Slot& slot = *static_cast<Slot*>(transfer->user_data);
-    slot.owner->settle(slot);
+    slot.owner->settle(slot.owner->out_, slot);
   }
 
   static constexpr int most_stalls = 100;  // a board that stalls more often in one session is broken
@@ -254,10 +276,8 @@ class UsbTransport final : public Transport {
   int interface_;
   int stalls_ = 0;
   bool gone_ = false, closing_ = false;
-  std::array<Slot, in_transfers> in_;
-  std::array<Slot, out_transfers> out_;
-  std::array<std::uint8_t, ring_bytes> ring_;
-  std::size_t start_ = 0, filled_ = 0;
+  Pipe in_, out_;
+  Ring<ring_bytes> ring_;
 };
 
 std::unique_ptr<Transport> open_seen(libusb_context* context, Seen& seen) {

@@ -2,7 +2,7 @@
 // Boards on USB, by libusb-1.0: finding them, and the stream of bytes over the vendor interface's two bulk endpoints.
 //
 // One Usb serves any number of boards in one thread: waiting on one of them moves the bytes of all. After open() no
-// memory is taken here; libusb itself takes and returns one small block for each transfer it hands to the kernel.
+// memory is taken here; what libusb takes: board.hpp. A stalled endpoint is lifted and the stream begun anew.
 #pragma once
 
 #include <memory>

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "console/link/messages.hpp"
+#include "console/link/sim.hpp"
 
 namespace {
 
@@ -64,6 +65,30 @@ TEST(Board, NoMemoryIsTakenAfterItsStart) {
   }
   EXPECT_EQ(allocations, before);
   EXPECT_EQ(sum_V, 480000.0);
+}
+
+/// The whole board included: firmware, USB stack and plant live in this process.
+TEST(Board, ASimulatedOneTakesNoMemoryAfterItsStart) {
+  for (const bool full_motors : {false, true}) {
+    console::link::SimulatedBoard options;
+    options.real_time = false;
+    options.full_motors = full_motors;
+    options.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors";
+    console::link::Board board(console::link::simulated_board(options));
+    const wire::Setpoints wish{3, {}, 0, {0, 0}, {0, 0}};
+    const std::span payload(reinterpret_cast<const std::uint8_t*>(&wish), sizeof wish);
+    const int before = allocations;
+    int states = 0;
+    for (int i = 1; i <= 500 && states == i - 1; ++i) {
+      board.write(static_cast<std::uint8_t>(wire::Kind::setpoint), payload);
+      for (int packets = 0; packets < 10 && states < i; ++packets) {
+        board.wait(10);
+        while (const wire::Frame* frame = board.read()) states += console::link::state_in(*frame).has_value();
+      }
+    }
+    EXPECT_EQ(allocations, before) << (full_motors ? "full" : "simple");
+    EXPECT_EQ(states, 500);
+  }
 }
 
 TEST(Board, AFullWayOutAndATooLongPayloadAreToldNotSent) {

@@ -2,7 +2,10 @@
 // A USB bus that the kernel never had: real libusb in an unmodified program, below it umockdev instead of usbfs, below
 // that virtual boards whose own USB stack answers every transfer.
 //
-//   umockdev-wrapper mocked_bus [--boards N] [--busy] [--unplug-after FRAMES] PROGRAM ARGUMENTS...
+//   umockdev-wrapper mocked_bus [--boards N] [--busy] [--unplug-after FRAMES] [--unplug-after-in PACKETS]
+//                               [--stall-out] [--stall-in PACKETS] PROGRAM ARGUMENTS...
+//
+// --stall-out: once, in the middle of the first frame that takes two packets.
 //
 // Ends with the program's exit code. Enumeration by a kernel is not shown here: sysfs is filled with the descriptors
 // that the board's stack gave.
@@ -39,7 +42,10 @@ constexpr std::uint8_t address = 1;
 
 struct Faults {
   bool busy = false;
-  int unplug_after = -1;  // OUT transfers
+  int unplug_after = -1;     // OUT transfers
+  int unplug_after_in = -1;  // IN packets
+  bool stall_out = false;
+  int stall_in = -1;  // before this IN packet
 };
 
 class MockedBoard {
@@ -95,8 +101,11 @@ class MockedBoard {
         return faults_.busy ? done(-1, EBUSY) : done(0, 0);
       case USBDEVFS_RELEASEINTERFACE:
       case USBDEVFS_SETCONFIGURATION:
-      case USBDEVFS_CLEAR_HALT:
         return done(0, 0);
+      case USBDEVFS_CLEAR_HALT: {
+        auto* data = umockdev_ioctl_data_resolve(argument, 0, sizeof(unsigned), nullptr);
+        return halt(data->data[0], false) ? done(0, 0) : done(-1, EPIPE);
+      }
       case USBDEVFS_SUBMITURB:
         return gone_ ? done(-1, ENODEV) : submit(argument) ? done(0, 0) : done(-1, EFAULT);
       case USBDEVFS_DISCARDURB: {
@@ -202,15 +211,36 @@ class MockedBoard {
     }
   }
 
+  /// SET_FEATURE or CLEAR_FEATURE, ENDPOINT_HALT: the board's own stack stalls. A kernel leaves the pipe alone until
+  /// CLEAR_HALT.
+  bool halt(std::uint8_t endpoint, bool on) {
+    Bytes nothing;
+    if (control(address, {0x02, static_cast<std::uint8_t>(on ? 3 : 1), 0, 0, endpoint, 0, 0, 0}, nothing) < 0)
+      return false;
+    if (!on) halted_[endpoint] = false;
+    return true;
+  }
+
+  void stalled(std::uint8_t endpoint) {
+    auto& queue = waiting_[endpoint];
+    finish(queue.front().urb, -EPIPE, queue.front().bytes);
+    queue.pop_front();
+    halted_[endpoint] = true;
+  }
+
   /// At most a packet each way, as the bus would carry them.
   void pump() {
     auto& out = waiting_[wire::link_out_endpoint];
-    if (!out.empty()) {
+    if (!out.empty() && !halted_[wire::link_out_endpoint]) {
       Waiting& w = out.front();
+      if (faults_.stall_out && w.bytes > 0) faults_.stall_out = !halt(wire::link_out_endpoint, true);
       const int n = std::min<int>(hal::usb_packet_bytes, w.urb.raw()->buffer_length - w.bytes);
       const std::span packet(w.urb.buffer->data + w.bytes, static_cast<std::size_t>(n));
-      if (board_.bus().out(address, wire::link_out_endpoint, board_.bus().toggle(wire::link_out_endpoint), packet) ==
-          Handshake::ack) {
+      const Handshake said =
+          board_.bus().out(address, wire::link_out_endpoint, board_.bus().toggle(wire::link_out_endpoint), packet);
+      if (said == Handshake::stall) {
+        stalled(wire::link_out_endpoint);
+      } else if (said == Handshake::ack) {
         w.bytes += n;
         if (w.bytes == w.urb.raw()->buffer_length) {
           finish(w.urb, 0, w.bytes);
@@ -220,9 +250,14 @@ class MockedBoard {
       }
     }
     auto& in = waiting_[wire::link_in_endpoint];
-    if (in.empty() || gone_) return;
+    if (in.empty() || gone_ || halted_[wire::link_in_endpoint]) return;
     std::remove_reference_t<decltype(board_.bus())>::Packet packet;
-    if (board_.bus().in(address, wire::link_in_endpoint, packet) != Handshake::ack) return;
+    if (came_ == faults_.stall_in) halt(wire::link_in_endpoint, true), faults_.stall_in = -1;
+    const Handshake said = board_.bus().in(address, wire::link_in_endpoint, packet);
+    if (said == Handshake::stall) return stalled(wire::link_in_endpoint);
+    if (said != Handshake::ack) return;
+    if (faults_.unplug_after_in >= 0 && came_ >= faults_.unplug_after_in) return unplug();
+    ++came_;
     Waiting& w = in.front();
     if (packet.bytes > 0)
       umockdev_ioctl_data_update(w.urb.buffer, static_cast<gsize>(w.bytes), packet.data.data(),
@@ -252,7 +287,8 @@ class MockedBoard {
   std::map<unsigned, std::deque<Waiting>> waiting_;
   std::deque<Urb> finished_;
   Clock::time_point last_;
-  int sent_ = 0;
+  std::map<unsigned, bool> halted_;
+  int sent_ = 0, came_ = 0;
   bool gone_ = false;
 };
 
@@ -270,6 +306,9 @@ int main(int argc, char** argv) {
     if (option == "--busy") faults.busy = true;
     if (option == "--boards" && at + 1 < argc) boards = std::atoi(argv[++at]);
     if (option == "--unplug-after" && at + 1 < argc) faults.unplug_after = std::atoi(argv[++at]);
+    if (option == "--unplug-after-in" && at + 1 < argc) faults.unplug_after_in = std::atoi(argv[++at]);
+    if (option == "--stall-out") faults.stall_out = true;
+    if (option == "--stall-in" && at + 1 < argc) faults.stall_in = std::atoi(argv[++at]);
   }
   if (at >= argc) return 2;
 

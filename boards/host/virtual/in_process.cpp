@@ -3,10 +3,10 @@
 // through the same USB stack as on a bus, a packet each way a PWM period (20 a ms; a full-speed bus carries 19).
 #include <algorithm>
 #include <chrono>
-#include <deque>
 #include <thread>
 
 #include "boards/host/virtual/virtual_board.hpp"
+#include "console/link/ring.hpp"
 #include "console/link/sim.hpp"
 #include "wire/pc/motor_file.hpp"
 
@@ -18,7 +18,8 @@ using boards::host::VirtualBoard;
 
 constexpr std::uint8_t bus_address = 1;
 constexpr double longest_lag_s = 1.0;       // of a program that stood still: then the board stood still as well
-constexpr std::size_t most_waiting = 4096;  // bytes on the way out, as a host controller's queue would hold them
+// Bytes on their way, as a host controller's queues would hold them: who does not read lets the board wait.
+constexpr std::size_t out_bytes = 1 << 12, in_bytes = 1 << 16;
 
 class InProcess final : public Transport {
  public:
@@ -40,17 +41,12 @@ class InProcess final : public Transport {
   }
 
   bool write(std::span<const std::uint8_t> bytes) override {
-    if (out_.size() + bytes.size() > most_waiting) return false;
-    out_.insert(out_.end(), bytes.begin(), bytes.end());
+    if (bytes.size() > out_.room()) return false;
+    out_.put(bytes);
     return true;
   }
 
-  std::size_t read(std::span<std::uint8_t> room) override {
-    const std::size_t n = std::min(room.size(), in_.size());
-    std::copy_n(in_.begin(), n, room.begin());
-    in_.erase(in_.begin(), in_.begin() + static_cast<std::ptrdiff_t>(n));
-    return n;
-  }
+  std::size_t read(std::span<std::uint8_t> room) override { return in_.take(room); }
 
   void wait(int milliseconds) override {
     if (!real_time_) {
@@ -61,7 +57,7 @@ class InProcess final : public Transport {
     while (true) {
       start_s_ = std::min(start_s_, start_s_ + board_.time_s() + longest_lag_s - world_s());
       run_until(world_s());
-      if (!in_.empty() || std::chrono::steady_clock::now() >= until) return;
+      if (in_.size() > 0 || std::chrono::steady_clock::now() >= until) return;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
   }
@@ -78,25 +74,24 @@ class InProcess final : public Transport {
 
   /// Lets the board live until then, or, when time is free, until something has arrived.
   void run_until(double time_s) {
-    while (board_.time_s() < time_s && (real_time_ || in_.empty())) {
+    while (board_.time_s() < time_s && (real_time_ || in_.size() == 0)) {
       exchange();
       board_.advance(1);
     }
   }
 
   void exchange() {
-    if (!out_.empty()) {
+    if (out_.size() > 0) {
       std::uint8_t packet[hal::usb_packet_bytes];
-      const std::size_t n = std::min(out_.size(), sizeof packet);
-      std::copy_n(out_.begin(), n, packet);
+      const std::size_t n = out_.peek(packet);
       if (board_.bus().out(bus_address, wire::link_out_endpoint, out_data1_, {packet, n}) == Handshake::ack) {
         out_data1_ = !out_data1_;
-        out_.erase(out_.begin(), out_.begin() + static_cast<std::ptrdiff_t>(n));
+        out_.drop(n);
       }
     }
     Bus::Packet packet;
-    if (board_.bus().in(bus_address, wire::link_in_endpoint, packet) != Handshake::ack) return;
-    for (const std::uint8_t byte : packet.view()) in_.push_back(byte);
+    if (in_.room() < hal::usb_packet_bytes) return;
+    if (board_.bus().in(bus_address, wire::link_in_endpoint, packet) == Handshake::ack) in_.put(packet.view());
   }
 
   VirtualBoard board_;
@@ -104,7 +99,8 @@ class InProcess final : public Transport {
   std::chrono::steady_clock::time_point start_;
   double start_s_ = 0;
   bool out_data1_ = false;
-  std::deque<std::uint8_t> out_, in_;
+  Ring<out_bytes> out_;
+  Ring<in_bytes> in_;
 };
 
 }  // namespace
