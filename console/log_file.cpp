@@ -9,7 +9,6 @@
 #include <filesystem>
 
 #include "console/parameter_file.hpp"
-#include "wire/pc/user_error.hpp"
 
 namespace console {
 
@@ -68,6 +67,13 @@ void LogFile::finish() {
   if (error)
     throw UserError(Exit::usage, path_ + ": cannot be written (" + error.message() + "); choose another place.");
   finished_ = true;
+}
+
+void LogFile::end(const UserError& error) const {
+  if (error.exit_code() != static_cast<int>(Exit::gone) || rows_ == 0) throw error;
+  std::string sentence = error.what();
+  if (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
+  throw UserError(Exit::gone, fmt::format("{}; {} holds the {} rows until then.", sentence, path_, rows_));
 }
 
 double BoardTime::at(std::uint32_t period) {

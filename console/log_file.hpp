@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "console/session.hpp"
+#include "wire/pc/user_error.hpp"
 
 namespace console {
 
@@ -32,6 +33,8 @@ class LogFile {
   int rows() const { return rows_; }
   double last_s() const { return last_s_; }
   void finish();
+  /// Throws `error` again; if the board went away, its sentence says what the file holds.
+  [[noreturn]] void end(const wire::pc::UserError& error) const;
 
  private:
   std::string path_, unfinished_;

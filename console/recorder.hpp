@@ -13,10 +13,15 @@ class Recorder {
   /// Subscribes to the signals at about `rate_Hz` and opens the log.
   Recorder(Session& session, const std::string& path, const std::string& what, const std::vector<Target>& signals,
            double rate_Hz);
+  /// Without finish(): nothing more is taken, and what came is kept.
+  ~Recorder() { session_.take_no_more(); }
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
   /// Ends telemetry and the log. Throws UserError as LogFile::finish does.
   void finish();
 
   double rate_Hz() const { return rate_Hz_; }
+  const LogFile& file() const { return file_; }
   int rows() const { return file_.rows(); }
   double seconds() const { return file_.last_s(); }
   std::uint32_t dropped() const { return dropped_; }

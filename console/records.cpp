@@ -135,10 +135,13 @@ void log(Console& console, const std::vector<std::string>& names, const std::str
   Recorder recorder(session, path, fmt::format("axis {}", index), signals, rate_Hz);
   console.tell(fmt::format("Logging axis {} at {:g} Hz; Ctrl-C ends it.", index, recorder.rate_Hz()));
   const double start_s = session.now_s();
-  while (!interrupted() && session.now_s() - start_s < seconds) {
-    session.wait_until(std::min(session.now_s() + 0.1, start_s + seconds));
+  try {
+    while (!interrupted() && session.now_s() - start_s < seconds)
+      session.wait_until(std::min(session.now_s() + 0.1, start_s + seconds));
+    recorder.finish();
+  } catch (const UserError& error) {
+    recorder.file().end(error);
   }
-  recorder.finish();
   std::string text = fmt::format("Written: {} ({} rows, {:.1f} s).\n", path, recorder.rows(), recorder.seconds());
   if (recorder.dropped() > 0)
     text += fmt::format("{} rows were lost on the way; ask for fewer signals or a lower --rate.\n", recorder.dropped());
@@ -179,6 +182,10 @@ void capture(Console& console, const CaptureArguments& a) {
                     fmt::format("{} rows of {} signals do not fit the board; at most {} rows, or fewer signals.",
                                 a.pre + a.post, signals.size(), most_rows));
   }
+  std::vector<std::string> columns;
+  for (const Target& signal : signals) columns.push_back(full_name(signal));
+  const std::string head =
+      preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level));
   session.capture(order, signals);
   wire::CaptureStatus status = session.capture_status();
   if (status.phase == wire::CapturePhase::waiting) console.tell("Waiting for the trigger; Ctrl-C gives up.");
@@ -194,23 +201,24 @@ void capture(Console& console, const CaptureArguments& a) {
     throw UserError(Exit::refused,
                     "The board captured other signals than were ordered; end other programs and try again.");
   }
-  std::vector<float> values;
-  for (int row = 0; row < status.rows;)
-    row += session.capture_read(static_cast<std::uint16_t>(row), static_cast<int>(signals.size()), values);
-
-  std::vector<std::string> columns;
-  for (const Target& signal : signals) columns.push_back(full_name(signal));
-  LogFile file(a.path, preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level)),
-               columns);
+  LogFile file(a.path, head, columns);
   std::vector<PlotLine> lines(signals.size());
-  for (std::size_t r = 0; r < status.rows; ++r) {
-    const auto first = values.begin() + static_cast<std::ptrdiff_t>(r * signals.size());
-    const std::vector<float> row(first, first + static_cast<std::ptrdiff_t>(signals.size()));
-    const double time_s = (static_cast<double>(r) - status.pre) * status.decimation / double{session.hello().pwm_Hz};
-    file.add(time_s, row);
-    for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);
+  std::vector<float> values, row(signals.size());
+  try {
+    for (int next = 0; next < status.rows;) {
+      values.clear();
+      next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values);
+      for (std::size_t at = 0; at < values.size(); at += row.size()) {
+        const int periods = (file.rows() - status.pre) * status.decimation;
+        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(at), row.size(), row.begin());
+        file.add(periods / double{session.hello().pwm_Hz}, row);
+        for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);
+      }
+    }
+    file.finish();
+  } catch (const UserError& error) {
+    file.end(error);
   }
-  file.finish();
   std::string text;
   for (std::size_t s = 0; s < lines.size(); ++s) {
     lines[s].label = columns[s];

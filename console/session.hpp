@@ -54,6 +54,8 @@ class Session {
   void subscribe(const std::vector<Target>& signals, std::uint16_t decimation,
                  std::function<void(const link::RowsView&)> taker);
   void unsubscribe();
+  /// Telemetry that still comes is thrown away.
+  void take_no_more() { taker_ = {}; }
 
   void capture(const wire::CaptureOrder& order, const std::vector<Target>& signals);
   wire::CaptureStatus capture_status();

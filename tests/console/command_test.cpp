@@ -11,6 +11,7 @@
 #include "console/commands.hpp"
 #include "console/plot.hpp"
 #include "console/profile.hpp"
+#include "console/recorder.hpp"
 #include "tests/console/fake_board.hpp"
 
 namespace {
@@ -300,10 +301,39 @@ TEST_F(Commands, ABoardThatGoesAwayWhileLoggingLeavesTheRowsUntilThen) {
   };
   const Said said = say("log --out " + path("x.csv") + " --seconds 5 --rate 50");
   EXPECT_EQ(said.code, 7) << said.err;
+  EXPECT_NE(said.err.find("x.csv holds the 51 rows until then.\n"), std::string::npos) << said.err;
   const std::string text = content(path("x.csv"));
   EXPECT_GT(std::count(text.begin(), text.end(), '\n'), 40);
   EXPECT_EQ(text.back(), '\n');
   EXPECT_FALSE(std::filesystem::exists(path("x.csv.part")));
+}
+
+TEST_F(Commands, ABoardThatGoesAwayWhileHandingOverACaptureLeavesTheRowsUntilThen) {
+  int reads = 0;
+  board_->before = [&](Kind kind) { return kind != Kind::capture_read || !(board_->unplugged = ++reads == 3); };
+  refused("capture axis0.iq_A axis1.iq_A --pre 100 --post 100 --out " + path("c.csv"), 7,
+          "c.csv holds the 116 rows until then.");
+  const std::string text = content(path("c.csv"));
+  EXPECT_NE(text.find("\n0.000750,115,115\n"), std::string::npos) << text;
+  EXPECT_EQ(text.back(), '\n');
+  EXPECT_FALSE(std::filesystem::exists(path("c.csv.part")));
+}
+
+TEST_F(Commands, ABoardThatGoesAwayBeforeTheFirstRowLeavesNoFile) {
+  board_->before = [&](Kind kind) { return kind != Kind::capture_read || !(board_->unplugged = true); };
+  refused("capture axis0.iq_A --out " + path("c.csv"), 7, "hand over the capture; check cable and power");
+  EXPECT_TRUE(is_empty());
+}
+
+/// The prompt goes on after Ctrl-C, and what the board still sends has nobody to go to.
+TEST_F(Commands, TelemetryAfterARecordingThatWasBrokenOffIsThrownAway) {
+  console::Session session(std::make_unique<FakeTransport>(board_));
+  {
+    console::Recorder recorder(session, path("x.csv"), "axis 0", console::usual_signals(session.signals(), 0), 100);
+    session.wait_until(session.now_s() + 0.5);
+    EXPECT_GT(recorder.rows(), 40);
+  }
+  session.wait_until(session.now_s() + 0.5);  // asan sees it if somebody takes these
 }
 
 TEST_F(Commands, ABoardThatTripsEndsTheRunWithItsReason) {
