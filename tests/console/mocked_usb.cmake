@@ -2,10 +2,15 @@
 #   cmake -D WRAPPER=umockdev-wrapper -D BUS=.../mocked_bus -D HOTCORE=.../hotcore -D SCRATCH=... -P mocked_usb.cmake
 include(${CMAKE_CURRENT_LIST_DIR}/expect.cmake)
 
-# on_bus(NAME code regex "options of mocked_bus" hotcore's arguments...)
+# on_bus(NAME code regex "options of mocked_bus" hotcore's arguments..., or WITH another program)
 function(on_bus name code regex bus)
   separate_arguments(bus)
-  expect(${name} ${code} "${regex}" ${WRAPPER} ${BUS} ${bus} ${HOTCORE} ${ARGN})
+  set(program ${HOTCORE} ${ARGN})
+  list(POP_FRONT ARGN first)
+  if(first STREQUAL WITH) # another program instead
+    set(program ${ARGN})
+  endif()
+  expect(${name} ${code} "${regex}" ${WRAPPER} ${BUS} ${bus} ${program})
 endfunction()
 
 on_bus(list 0 "SIM0 +virtual +bus 1 port 1" "" list)
@@ -24,6 +29,25 @@ on_bus(one_of_two 0 "current_limit_A" "--boards 2" --serial SIM1 get current_lim
 on_bus(busy 6 "another program holds the board" "--busy" get)
 on_bus(gone_while_backing_up 7 "unplugged when asked to describe parameter" "--unplug-after 20" backup half.toml)
 on_bus(gone_while_saving 7 "unplugged when asked to save" "--unplug-after 1" save)
+on_bus(gone_while_logging 7 "unplugged when asked to go on.*cut.csv holds the [0-9]+ rows until then" "--unplug-after-in 300" log --out cut.csv --seconds 5 --rate 1000)
+expect(identify_reads_what_was_kept 3 "cut.csv: no current and no power flows" ${IDENTIFY} cut.csv --motor ec-16-40w)
+on_bus(gone_while_capturing 7 "unplugged when asked to hand over the capture.*cut_c.csv holds the [0-9]+ rows until then" "--unplug-after-in 150" capture axis0.ia_A axis0.ib_A --out cut_c.csv)
+foreach(file cut.csv cut_c.csv)
+  file(READ ${SCRATCH}/${file} text)
+  if(NOT text MATCHES "\n[-0-9.]+(,[-0-9.e]*)+\n$" OR EXISTS ${SCRATCH}/${file}.part)
+    fails("${file} ends in the middle of a row")
+  endif()
+endforeach()
+
+# The board's own stack stalls: in the middle of a frame that takes two packets, and instead of an answer.
+set(several axis0.ramp_s=0.3 axis1.ramp_s=0.3 axis0.current_limit_A=12 axis1.current_limit_A=9 axis0.offset_bound_A=0.4
+            axis1.offset_bound_A=0.4 axis0.setpoint_timeout_s=0.2 axis1.setpoint_timeout_s=0.2)
+on_bus(stalled_on_the_way_out 0 "axis1.setpoint_timeout_s +0.1 -> 0.2.*In force" "--stall-out" set ${several})
+foreach(packet 0 1 2 5 8 50)
+  on_bus(stalled_on_the_way_in_${packet} 0 "axis0.pole_pairs +1 " "--stall-in ${packet}" get axis0.pole_pairs)
+endforeach()
+on_bus(no_memory_after_the_start 0 "500 exchanges: 0 blocks by operator new, 10[0-9][0-9] by calloc of libusb" "" WITH ${LINK_MEMORY})
+
 foreach(file half.toml half.toml.part)
   if(EXISTS ${SCRATCH}/${file})
     fails("${file} was left behind")

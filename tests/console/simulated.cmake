@@ -15,6 +15,8 @@ expect(no_difference 0 "No difference to mine.toml" ${sim} diff mine.toml)
 expect(restore 0 "Nothing changed" ${sim} restore mine.toml)
 expect(arm 0 "Done in 0.5" ${sim} arm --iq 1 --seconds 0.5)
 expect(run 0 "Done in 0.5.*peak current 5.*disarmed|disarmed: peak current 5" ${sim} run "5A 0.3s, 0A 0.2s" --axis 1)
+expect(mode 0 "axis 0: current mode, setpoints in A.*axis 1: current mode" ${sim} mode)
+expect(run_in_the_wrong_mode 8 "Axis 0 refused the setpoint 0.02 N m: the setpoint has another unit" ${sim} run "20mNm 0.3s")
 expect(stop 0 "Disarmed: both axes" ${sim} stop)
 expect(calibrate 0 "axis 1: the current sensors' offsets are" ${sim} calibrate)
 expect(fault 0 "axis 0: no fault" ${sim} fault)
@@ -33,6 +35,9 @@ expect(identify_reads_the_log 0 "Verdict: " ${IDENTIFY} x.csv --motor ec-16-40w)
 
 set(typed "set axis0.current_limit_A=7\nget axis0.current_limit_A\nbogus\nrun \"3A 0.1s\"\nquit\n")
 expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
+set(typed "mode torque --axis 1\nrun \"20mNm 0.1s\" --axis 1\nrun \"3A 0.1s\"\nmode\nquit\n")
+# 3/2 pole pairs flux linkage of this motor: 6.5 mN m/A, so 3.1 A.
+expect(prompt_in_torque_mode 0 "axis 1: torque mode, setpoints in N m.*1    ready   torque .*Done in 0.1[0-9]* s and disarmed: peak current 3.[1-3] A.*Done in 0.1.*axis 0: current mode.*axis 1: torque mode" ${sim})
 set(typed "")
 expect(identification 0 "axis0.R2_K_per_W +16.3 -> 1[567].*In force until" ${sim} identify --minutes 6 --out found --yes)
 
