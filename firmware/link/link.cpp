@@ -10,7 +10,7 @@ namespace firmware {
 void Link::restart() {
   reader_.restart();
   held_ = held_count_ = sent_ = queued_ = 0;
-  errand_wanted_ = false;
+  if (errand_for_ == For::program) errand_for_ = For::nobody;
 }
 
 void Link::take(const std::uint8_t* data, std::size_t bytes) {
@@ -21,6 +21,7 @@ void Link::take(const std::uint8_t* data, std::size_t bytes) {
 }
 
 std::size_t Link::give(std::uint8_t* out, std::size_t room) {
+  settle();
   if (errand_.load(std::memory_order_relaxed) == Errand::done && has_room()) return_errand();
   digest();
   if (queued_ - sent_ < room) {
@@ -62,23 +63,53 @@ void Link::send(std::uint8_t kind, std::uint8_t sequence, const Reply& reply) {
 }
 
 void Link::take_errand(const wire::Frame& request, Reply& reply) {
+  settle();
   if (errand_.load(std::memory_order_relaxed) != Errand::none) return reply.refuse(wire::Status::busy);
-  errand_kind_ = request.kind;
   errand_sequence_ = request.sequence;
   errand_bytes_ = request.bytes;
   std::memcpy(errand_payload_, request.payload, request.bytes);
-  errand_wanted_ = true;
+  start_errand(request.kind, For::program);
+}
+
+void Link::start_errand(std::uint8_t kind, For whom) {
+  errand_kind_ = kind;
+  errand_for_ = whom;
   std::atomic_signal_fence(std::memory_order_release);
   errand_.store(Errand::asked, std::memory_order_relaxed);
 }
 
+bool Link::begin(wire::Kind kind) {
+  settle();
+  if (errand_.load(std::memory_order_relaxed) != Errand::none) return false;
+  terminal_done_ = false;
+  start_errand(static_cast<std::uint8_t>(kind), For::terminal);
+  return true;
+}
+
+bool Link::finished(wire::Answer& answer) {
+  settle();
+  answer = terminal_answer_;
+  return terminal_done_;
+}
+
+/// What is done and needs no frame makes room for the next one.
+void Link::settle() {
+  if (errand_.load(std::memory_order_relaxed) != Errand::done || errand_for_ == For::program) return;
+  std::atomic_signal_fence(std::memory_order_acquire);
+  if (errand_for_ == For::terminal) {
+    std::memcpy(&terminal_answer_, errand_answer_, sizeof terminal_answer_);
+    terminal_done_ = true;
+    if (terminal_answer_.status != 0 && static_cast<wire::Kind>(errand_kind_) == wire::Kind::commit)
+      (void)commands_.parameters().load(wire::LoadFrom::in_force);  // what was refused does not stay staged
+  }
+  errand_.store(Errand::none, std::memory_order_relaxed);
+}
+
 void Link::return_errand() {
   std::atomic_signal_fence(std::memory_order_acquire);
-  if (errand_wanted_) {
-    Reply reply;
-    reply.append(errand_answer_, errand_answer_bytes_);
-    send(static_cast<std::uint8_t>(errand_kind_ | wire::reply_bit), errand_sequence_, reply);
-  }
+  Reply reply;
+  reply.append(errand_answer_, errand_answer_bytes_);
+  send(static_cast<std::uint8_t>(errand_kind_ | wire::reply_bit), errand_sequence_, reply);
   errand_.store(Errand::none, std::memory_order_relaxed);
 }
 

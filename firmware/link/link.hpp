@@ -48,6 +48,10 @@ class Link {
   }
 
   Commands& commands() { return commands_; }
+  /// A commit or a save for the text port, as an errand like any other. False: an earlier one is not done. USB context.
+  bool begin(wire::Kind kind);
+  /// True once it is done: this is the answer.
+  bool finished(wire::Answer& answer);
   /// False while the main context checks or saves parameters: until then nobody arms and nobody stages. USB context.
   bool parameters_free() const;
   /// Frames that were torn or damaged.
@@ -64,7 +68,10 @@ class Link {
   void obey(const wire::Frame& request);
   void send(std::uint8_t kind, std::uint8_t sequence, const Reply& reply);
   bool has_room() const { return sizeof queue_ - (queued_ - sent_) >= wire::max_encoded; }
+  enum class For : std::uint8_t { nobody, program, terminal };
   void take_errand(const wire::Frame& request, Reply& reply);
+  void start_errand(std::uint8_t kind, For whom);
+  void settle();
   void return_errand();
   wire::Answer load();
   void look_ahead();
@@ -86,7 +93,9 @@ class Link {
   std::uint8_t telemetry_sequence_ = 0;
 
   std::atomic<Errand> errand_{Errand::none};
-  bool errand_wanted_ = false;  // by the program that now listens
+  For errand_for_ = For::nobody;  // who still listens
+  bool terminal_done_ = false;
+  wire::Answer terminal_answer_{};
   std::uint8_t errand_kind_ = 0, errand_sequence_ = 0;
   std::uint16_t errand_bytes_ = 0;
   std::uint8_t errand_payload_[sizeof(wire::Ask) + wire::max_segments * sizeof(wire::Segment)]{};

@@ -47,8 +47,16 @@ bool axis_number(const char* text, int& axis) {
 }  // namespace
 
 void TextPort::take(const std::uint8_t* data, std::size_t bytes) {
-  for (std::size_t i = 0; i < bytes; ++i) {
-    const char c = static_cast<char>(data[i]);
+  held_ = 0;
+  held_count_ = std::min(bytes, sizeof held_packet_);
+  std::memcpy(held_packet_, data, held_count_);
+  digest();
+}
+
+/// What came and was not looked at yet, up to a line that takes time.
+void TextPort::digest() {
+  while (held_ < held_count_ && !waits_) {
+    const char c = static_cast<char>(held_packet_[held_++]);
     if (c == '\r' || c == '\n') {
       line_[line_count_] = 0;
       if (too_long_)
@@ -66,6 +74,12 @@ void TextPort::take(const std::uint8_t* data, std::size_t bytes) {
 }
 
 std::size_t TextPort::give(std::uint8_t* out, std::size_t room) {
+  wire::Answer answer;
+  if (waits_ && link_.finished(answer)) {
+    waits_ = false;
+    say(answer);
+  }
+  digest();
   const std::size_t bytes = std::min(room, count_ - said_);
   std::memcpy(out, answer_ + said_, bytes);
   said_ += bytes;
@@ -82,8 +96,14 @@ void TextPort::obey(char* line) {
     const char* const name = next_word(line);
     return get(name, next_word(line));
   }
+  if (is("set")) {
+    const char* const name = next_word(line);
+    const char* const value = next_word(line);
+    return set(name, value, next_word(line));
+  }
+  if (is("save")) return save();
   int i = 0;
-  const bool commands_axis = is("arm") || is("disarm") || is("clear") || is("iq");
+  const bool commands_axis = is("arm") || is("disarm") || is("clear") || is("mode") || is("iq") || is("torque");
   if (!commands_axis) return say("unknown command; try: help\r\n");
   if (!axis_number(next_word(line), i)) return say("name axis 0 or 1\r\n");
   Axis& axis = commands_.driver().axis(i);
@@ -93,28 +113,53 @@ void TextPort::obey(char* line) {
     axis.disarm();
     return say(wire::Status::done);
   }
-  float iq_A = 0.0f;
-  if (!number(next_word(line), iq_A)) return say("give amperes, such as: iq 0 1.5\r\n");
-  say(axis.set_current({0.0f, iq_A}));
+  const char* const word = next_word(line);
+  if (is("mode")) {
+    for (const wire::ControlMode mode : {wire::ControlMode::current, wire::ControlMode::torque})
+      if (std::strcmp(word, wire::text_of(mode)) == 0) return say(axis.choose(mode));
+    return say("give current or torque, such as: mode 0 torque\r\n");
+  }
+  float wish = 0.0f;
+  if (is("torque")) {
+    if (!number(word, wish)) return say("give newton metres, such as: torque 0 0.02\r\n");
+    return say(axis.set_torque(0.0f, wish));
+  }
+  if (!number(word, wish)) return say("give amperes, such as: iq 0 1.5\r\n");
+  say(axis.set_current({0.0f, wish}));
 }
 
 void TextPort::help() {
   say("state            both axes\r\n"
       "arm 0            ready for setpoints; disarm 0, clear 0 (after a fault)\r\n"
       "iq 0 1.5         amperes; fades unless it is sent again within the time-out\r\n"
+      "mode 0 torque    then: torque 0 0.02, newton metres; or: mode 0 current\r\n"
       "get pole_pairs   a parameter of both axes; get pole_pairs 0: of one\r\n"
+      "set ramp 0.3     both axes off; set ramp 0.3 0: of one; save: over a reset\r\n"
       "Everything else: the program hotcore.\r\n");
 }
 
+/// -1, and said so: there is none.
+int TextPort::parameter_named(const char* name) {
+  for (int i = 0; i < parameter_count; ++i)
+    if (std::strcmp(parameter_info(i)->name, name) == 0) return i;
+  say("no such parameter; names and ranges: hotcore get\r\n");
+  return -1;
+}
+
+/// Both unless one is named; false, and said so: neither.
+bool TextPort::axes_in(const char* axis, int& first, int& last) {
+  first = 0, last = axis_count - 1;
+  if (*axis == 0) return true;
+  if (axis_number(axis, first)) return last = first, true;
+  say("name axis 0 or 1\r\n");
+  return false;
+}
+
 void TextPort::get(const char* name, const char* axis) {
-  int first = 0, last = axis_count - 1;
-  if (*axis != 0) {
-    if (!axis_number(axis, first)) return say("name axis 0 or 1\r\n");
-    last = first;
-  }
-  int index = 0;
-  while (index < parameter_count && std::strcmp(parameter_info(index)->name, name) != 0) ++index;
-  if (index == parameter_count) return say("no such parameter; names and ranges: hotcore get\r\n");
+  int first = 0, last = 0;
+  if (!axes_in(axis, first, last)) return;
+  const int index = parameter_named(name);
+  if (index < 0) return;
   const wire::ParameterInfo& p = *parameter_info(index);
   for (int i = first; i <= last; ++i) {
     float value = 0.0f;
@@ -127,12 +172,47 @@ void TextPort::get(const char* name, const char* axis) {
   }
 }
 
+/// As the link does it: staged, then checked as a whole and put in force by the main context. What another program has
+/// staged and not committed is not touched.
+void TextPort::set(const char* name, const char* value, const char* axis) {
+  int first = 0, last = 0;
+  float number_given = 0.0f;
+  const int index = parameter_named(name);
+  if (index < 0) return;
+  if (!number(value, number_given)) return say("give a number, such as: set ramp 0.3\r\n");
+  if (!axes_in(axis, first, last)) return;
+  ParameterStore& parameters = commands_.parameters();
+  if (!link_.parameters_free() || parameters.uncommitted()) return say(wire::Status::busy);
+  const wire::ParameterInfo& p = *parameter_info(index);
+  for (int i = first; i <= last; ++i) {
+    const wire::Answer found = parameters.stage({{p.id, static_cast<std::uint8_t>(i)}, number_given});
+    if (found.status == 0) continue;
+    say("it may be ");
+    say_exactly(p.min);
+    say(" to ");
+    say_exactly(p.max);
+    say(" ");
+    say(wire::text_of(p.unit));
+    return say("\r\n");
+  }
+  waits_ = link_.begin(wire::Kind::commit);
+  if (waits_) return;
+  (void)parameters.load(wire::LoadFrom::in_force);
+  say(wire::Status::busy);
+}
+
+void TextPort::save() {
+  waits_ = link_.begin(wire::Kind::save);
+  if (!waits_) say(wire::Status::busy);
+}
+
 void TextPort::state() {
   const wire::State now = commands_.state();
   for (int i = 0; i < axis_count; ++i) {
     const wire::AxisReport& a = now.axis[i];
     say(i == 0 ? "axis 0: " : "axis 1: ");
     say(text_of(static_cast<Mode>(a.mode)));
+    if (a.control != wire::ControlMode::current) say(", "), say(wire::text_of(a.control)), say(" mode");
     say(", iq ");
     say(a.iq_A);
     say(" A, ");
@@ -160,6 +240,16 @@ void TextPort::say(wire::Status status) {
   say("; ");
   say(text.advice);
   say("\r\n");
+}
+
+/// With the parameter that it names.
+void TextPort::say(const wire::Answer& answer) {
+  for (int i = 0; answer.id != 0 && i < parameter_count; ++i) {
+    if (parameter_info(i)->id != answer.id) continue;
+    say(parameter_info(i)->name);
+    say(answer.axis == 0 ? " of axis 0: " : " of axis 1: ");
+  }
+  say(static_cast<wire::Status>(answer.status));
 }
 
 /// Two decimals, up to a million.
