@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Completion as a person at a terminal has it: the function of hotcore.bash with the words bash would hand it, then the
+# TAB key in an interactive bash and at the prompt of hotcore, both on a pseudo-terminal.   completion.sh HOTCORE hotcore.bash
+set -uo pipefail
+hotcore=$1 completion=$2
+export HOTCORE_SIM_FAST=1 TERM=dumb
+source "$completion"
+failures=0
+check() { # WHAT GOT WANTED
+  if [ "$2" = "$3" ]; then echo "$1: $2"; else echo "$1: got '$2', wanted '$3'"; failures=$((failures + 1)); fi
+}
+offered() { # WORD... (the last one is being typed): what is offered for it
+  COMP_WORDS=("$hotcore" "$@") COMP_CWORD=$# COMPREPLY=()
+  _hotcore 2>/dev/null
+  echo "${COMPREPLY[*]}"
+}
+check "a command" "$(offered ca)" "calibrate capture"
+check "an option of the program" "$(offered --s)" "--serial --sim"
+check "an option of a command" "$(offered arm --t)" "--torque"
+check "a mode" "$(offered mode t)" "torque"
+check "a parameter" "$(offered --sim get axis0.pole)" "axis0.pole_pairs"
+check "a parameter to set" "$(offered --sim set axis1.cur)" "axis1.current_limit_A= axis1.current_bandwidth_Hz="
+check "a signal" "$(offered --sim watch sp)" "speed_rad_per_s"
+check "the board of that serial" "$(offered --sim --serial X7 get offset_b)" "offset_bound_A"
+check "no board: no names, no noise" "$(offered --serial NOBODY get axis0.pole)" ""
+cd "$(mktemp -d)"
+touch mine.toml
+check "a file" "$(offered restore mi)" "mine.toml"
+each=$(for c in $("$hotcore" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do offered "$c" | sed "s/.*/$c/"; done | wc -l)
+check "every command of --help" "$each" "$("$hotcore" --help | sed -n '/^Subcommands:/,$p' | grep -c '^  [a-z]')"
+
+typed() { script -qec "$1" /dev/null 2>&1 | tr -d '\r'; }
+said=$(printf 'PATH=%s:$PATH\nsource %s\nhotcore --sim get axis0.pole\t\nexit\n' "$(dirname "$hotcore")" "$completion" | typed "bash --norc --noprofile -i")
+check "TAB in an interactive bash" "$(grep -o '^axis0.pole_pairs  *1 ' <<<"$said" | tr -s ' ')" "axis0.pole_pairs 1 "
+said=$(printf 'get axis1.pole\t\nquit\n' | typed "$hotcore --sim")
+check "TAB at the prompt" "$(grep -o '^axis1.pole_pairs  *1 ' <<<"$said" | tr -s ' ')" "axis1.pole_pairs 1 "
+exit $((failures > 0))
