@@ -32,13 +32,16 @@ set_up() {
   (cd "$here" && { [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" >/dev/null; } && cmake --build --preset "$preset" ${2:+--target "$2"} >&2)
 }
 
-# set_up_guest: a Linux kernel of Debian's, unpacked (not installed) into build/guest/kernel, for the test of the whole USB chain.
+# set_up_guest: a Linux kernel and udev of Debian's, unpacked (not installed) into build/guest, for the test of the whole USB chain.
 set_up_guest() {
   install_missing "${packages_guest[@]}"
-  local guest=$here/build/guest package
-  [ -d "$guest/kernel/boot" ] && return 0
-  package=$(apt-cache depends linux-image-amd64 | awk '/Depends: linux-image/ { print $2; exit }')
+  unpack_into_guest kernel "$(apt-cache depends linux-image-amd64 | awk '/Depends: linux-image/ { print $2; exit }')"
+  unpack_into_guest udev udev
+}
+unpack_into_guest() {
+  local guest=$here/build/guest folder=$1 package=$2
+  [ -d "$guest/$folder" ] && return 0
   say "Fetching: $package"
   mkdir -p "$guest"
-  (cd "$guest" && apt-get download -qq -o APT::Sandbox::User=root "$package" && dpkg -x "$package"_*.deb unpacked && rm "$package"_*.deb && mv unpacked kernel)
+  (cd "$guest" && apt-get download -qq -o APT::Sandbox::User=root "$package" && dpkg -x "$package"_*.deb unpacked && rm "$package"_*.deb && mv unpacked "$folder")
 }
