@@ -237,8 +237,14 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
     }
     if (stopped >= 0) motor.extinguish(stopped);
     left_s -= step_s;
-    if (left_s < 1e-12) break;
+    if (left_s < 1e-12) return;
   }
+  // Diodes that the back-EMF just reaches open and close without end: then none of them carries, and time goes on.
+  constexpr double nothing_A = 1e-3;
+  const std::array<double, 3> rest_A = motor.current_A();
+  const bool driven = std::any_of(gates.begin(), gates.end(), [](Gate gate) { return gate != Gate::off; });
+  const bool rests = std::all_of(rest_A.begin(), rest_A.end(), [](double i_A) { return std::fabs(i_A) < nothing_A; });
+  if (!driven && rests) motor.step(left_s, {0, 0, 0}, 7, false);
 }
 
 void Bridge::charge_ripple(int phase, double squared_A2s, double winding_ohm) {

@@ -188,6 +188,23 @@ TEST(Bridge, ATurningMotorRectifiesOnlyAboveTheBus) {
   }
 }
 
+/// Also where the back-EMF just reaches the diodes: a current that would end where it began takes no time away.
+TEST(Bridge, AReleasedMotorTurnsOnAtEverySpeed) {
+  int rectifying = 0, quiet = 0;
+  for (double speed_rad_per_s = 3100; speed_rad_per_s < 3700; speed_rad_per_s += 5) {
+    Locked bench(host_sim::motor_from_sheet(plant_tests::small_motor()), BridgeDesign{});
+    bench.motor.load.mode = Load::Mode::imposed_speed;
+    bench.motor.load.speed_rad_per_s = speed_rad_per_s;
+    constexpr int periods = 400;
+    bench.run({{0, 0, 0}, false}, 24, periods);
+    const double turned_rad = bench.motor.angle_rad() + 2 * host_sim::pi * static_cast<double>(bench.motor.turns());
+    EXPECT_NEAR(turned_rad, speed_rad_per_s * periods * period_s, 1e-6) << speed_rad_per_s;
+    bench.bridge.work().bus_J < 0 ? ++rectifying : ++quiet;
+  }
+  EXPECT_GT(rectifying, 10);
+  EXPECT_GT(quiet, 10);
+}
+
 TEST(Supply, ANonSinkingSupplyRisesByExactlyTheReturnedEnergy) {
   SupplyDesign design;
   Supply supply(design);
