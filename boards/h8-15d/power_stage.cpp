@@ -164,7 +164,9 @@ void PowerStage::drive(int axis, const hal::Duty& duty) {
   reg(t + tim::ccr1) = static_cast<std::uint32_t>(duty.ratio.a * static_cast<float>(reload) + 0.5f);
   reg(t + tim::ccr1 + 4) = static_cast<std::uint32_t>(duty.ratio.b * static_cast<float>(reload) + 0.5f);
   reg(t + tim::ccr1 + 8) = static_cast<std::uint32_t>(duty.ratio.c * static_cast<float>(reload) + 0.5f);
-  if (!wanted_on_[axis]) {
+  // The bridge follows a period later, when what is written here shapes it: until then the timer still has the duty of
+  // the last run, which would short a turning motor's back-EMF. Nor after an over-current that the core has not seen.
+  if (!wanted_on_[axis] && active_[axis].on && !over_current_[axis]) {
     reg(t + tim::sr) = 0x1E7F;  // BIF of an old break (rc_w0)
     reg(t + tim::bdtr) = bdtr_fixed | bit(15);
     wanted_on_[axis] = true;

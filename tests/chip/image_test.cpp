@@ -123,6 +123,37 @@ TEST(Image, EachMotorFeelsItsDutiesFromTopToTopOfItsOwnTimer) {
   NO_TROUBLE(*pcb);
 }
 
+/// The timers' compare registers take a duty over a period after it was written: a bridge that opened at once would
+/// meet a turning motor with the duty of its last run.
+TEST(Image, AStartOnATurningMotorMeetsNoOldDuty) {
+  NEEDS_IMAGE(image);
+  Options o;
+  o.motor = "ec-16-40w";
+  o.locked = false;
+  auto pcb = board(o);
+  pcb->bench.load(0).mode = pcb->bench.load(1).mode = host_sim::Load::Mode::imposed_speed;
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 0.0f, 0.0f, 0.05);
+  pcb->run_for(0.4);  // faded and open again, the last duty still in the registers
+  for (int i : {0, 1}) pcb->bench.load(i).speed_rad_per_s = 3000;
+  pcb->run_for(0.05);
+  ASSERT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+  pcb->set_current(0, 0.0f, 0.0f);
+  pcb->set_current(1, 0.0f, 0.0f);
+  double most_A = 0;
+  for (int k = 0; k < 400; ++k) {  // 10 ms
+    pcb->run_for(25e-6);
+    for (int i : {0, 1}) {
+      const auto truth = pcb->bench.truth(i);
+      most_A = std::max(most_A, std::hypot(truth.current_d_A, truth.current_q_A));
+    }
+  }
+  EXPECT_FALSE(pcb->gates_open(0) || pcb->gates_open(1));
+  EXPECT_LT(most_A, 1.5);  // 13 V on 30 uH for a period are 21 A
+  std::printf("most current at the start %.2f A\n", most_A);
+  NO_TROUBLE(*pcb);
+}
+
 TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
   NEEDS_IMAGE(image);
   for (const double electrical_turns : {0.05, 0.30, 0.47, 0.70, 0.95}) {
