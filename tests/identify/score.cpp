@@ -183,7 +183,7 @@ struct Arguments {
   int seeds = 20, at_most = 0;
   std::uint64_t first = tests::rotating_seed();
   double structure = 0.1, strength = 1;
-  bool verbose = false, json = false, check = false, quick = false;
+  bool verbose = false, explain = false, json = false, check = false, quick = false;
   identify::Margins margins;
 };
 
@@ -301,6 +301,9 @@ int score(const Arguments& a) {
             "{} seed {}: {}; {}{}{}\n", tests::joined(r.truth), c.log.seed, r.answer_text(), r.remarks,
             r.D ? fmt::format(" D {:.1f};", *r.D) : "",
             r.core_before_K ? fmt::format(" winding {:.2f} -> {:.2f} K", *r.core_before_K, *r.core_after_K) : "");
+        for (const std::string& step : r.steps) {
+          if (a.explain) fmt::print("    {}\n", step);
+        }
         std::fflush(stdout);
       }
       progress(row->key);
@@ -354,6 +357,7 @@ int main(int argc, char** argv) {
   app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
   app.add_flag("--check", a.check, "end with an error below the floors");
   app.add_flag("--verbose", a.verbose, "one line a log");
+  app.add_flag("--explain", a.explain, "with it, identify's reasoning");
   app.add_flag("--json", a.json, "the table as JSON");
   CLI11_PARSE(app, argc, argv);
   if (list) {

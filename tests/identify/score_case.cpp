@@ -158,6 +158,7 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.verdict = found.verdict;
   result.answer = found.tied;
+  result.steps = found.steps;
   result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
                                found.base.ratio, found.chosen.ratio, found.chosen.explained);
   check_parameters(log, problem, found, result);
