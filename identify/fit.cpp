@@ -95,25 +95,51 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   return m;
 }
 
-/// The whitening filter of one channel: residual = white/sqrt(n) + slow, slow a first-order process. A scalar Kalman
-/// filter predicts the slow part; what is left over, divided by its standard deviation, is white.
+/// The whitening filter of one channel: residual = white/sqrt(n) + wander + disturbance, the latter two first-order
+/// processes. A Kalman filter predicts these; what is left over, divided by its standard deviation, is white.
 struct Whitener {
-  double keep, slow2, white2, P;
-  double gain = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
+  double keep, keep_disturbed, wander2, disturbance2, white2;
+  double P, P_both, P_disturbed;
+  double gain = 0, gain_disturbed = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
 
-  Whitener(double white_K, double slow_K, double slow_s, double step_s)
-      : keep(slow_s > 0 ? std::exp(-step_s / slow_s) : 0),
-        slow2(slow_K * slow_K),
-        white2(white_K * white_K),
-        P(slow2) {}
+  static Whitener housing(const Noise& n, double step_s) {
+    return {n, n.housing_white_K, n.housing_slow_K, n.disturbance_K, step_s};
+  }
+  static Whitener core(const Noise& n, double step_s) {
+    return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
+  }
 
   void reading(double n) {
-    const double S = P + white2 / n + 1e-8;
-    gain = P / S;
+    const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + 1e-8;
+    gain = a / S;
+    gain_disturbed = b / S;
     weight = 1 / std::sqrt(S);
-    P *= 1 - gain;
+    P -= gain * a;
+    P_both -= gain * b;
+    P_disturbed -= gain_disturbed * b;
   }
-  void step() { P = keep * keep * P + (1 - keep * keep) * slow2; }
+  void step() {
+    P = keep * keep * P + (1 - keep * keep) * wander2;
+    P_both *= keep * keep_disturbed;
+    P_disturbed = keep_disturbed * keep_disturbed * P_disturbed + (1 - keep_disturbed * keep_disturbed) * disturbance2;
+  }
+
+ private:
+  Whitener(const Noise& n, double white_K, double slow_K, double disturbance_K, double step_s)
+      : keep(std::exp(-step_s / n.slow_s)),
+        keep_disturbed(std::exp(-step_s / n.disturbance_s)),
+        wander2(slow_K * slow_K),
+        disturbance2(disturbance_K * disturbance_K),
+        white2(white_K * white_K),
+        P(wander2),
+        P_both(0),
+        P_disturbed(disturbance2) {}
+};
+
+/// What the filter predicts of a residual (the last) and of its sensitivities.
+template <int N>
+struct Predicted {
+  double wander[N + 1] = {}, disturbance[N + 1] = {};
 };
 
 template <int N>
@@ -122,23 +148,34 @@ struct Sums {
   double g[N] = {};
   double misfit = 0;
   int readings = 0;
-  double predicted[N + 1];
 };
 
-/// Adds one channel's reading to the sums.
+/// Adds one channel's bin to the sums; n readings, 0: none.
 template <int N>
-void add(Sums<N>& sums, Whitener& w, double (&slow)[N + 1], const Dual<N>& simulated, double measured, double n) {
-  w.reading(n);
-  double e[N + 1];
-  e[N] = (simulated.v - measured - slow[N]) * w.weight;
-  for (int i = 0; i < N; ++i) e[i] = (simulated.d[i] - slow[i]) * w.weight;
-  const double back = w.gain / w.weight;
-  for (int i = 0; i <= N; ++i) slow[i] += back * e[i];
-  sums.misfit += 0.5 * e[N] * e[N];
-  ++sums.readings;
-  for (int i = 0; i < N; ++i) {
-    sums.g[i] += e[i] * e[N];
-    for (int j = 0; j <= i; ++j) sums.H[i][j] += e[i] * e[j];
+void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& simulated, double measured, double n) {
+  const bool disturbed = w.disturbance2 > 0;
+  if (n > 0) {
+    w.reading(n);
+    double e[N + 1];
+    e[N] = simulated.v - measured;
+    for (int i = 0; i < N; ++i) e[i] = simulated.d[i];
+    for (int i = 0; i <= N; ++i) e[i] = (e[i] - predicted.wander[i] - predicted.disturbance[i]) * w.weight;
+    const double back = w.gain / w.weight, back_disturbed = w.gain_disturbed / w.weight;
+    for (int i = 0; i <= N; ++i) predicted.wander[i] += back * e[i];
+    if (disturbed) {
+      for (int i = 0; i <= N; ++i) predicted.disturbance[i] += back_disturbed * e[i];
+    }
+    sums.misfit += 0.5 * e[N] * e[N];
+    ++sums.readings;
+    for (int i = 0; i < N; ++i) {
+      sums.g[i] += e[i] * e[N];
+      for (int j = 0; j <= i; ++j) sums.H[i][j] += e[i] * e[j];
+    }
+  }
+  w.step();
+  for (int i = 0; i <= N; ++i) predicted.wander[i] *= w.keep;
+  if (disturbed) {
+    for (int i = 0; i <= N; ++i) predicted.disturbance[i] *= w.keep_disturbed;
   }
 }
 
@@ -157,7 +194,6 @@ bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const E
   out.readings = 0;
   out.gradient = Eigen::VectorXd::Zero(all);
   out.information = Eigen::MatrixXd::Zero(all, all);
-  const Noise& noise = problem.noise;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
     const int own = shared + per_log_count * static_cast<int>(l);
@@ -166,29 +202,17 @@ bool evaluate(const Problem& problem, const std::vector<Chosen>& chosen, const E
     const auto housing0 = Dual<N>::variable(x[own], shared), excess = Dual<N>::variable(x[own + 1], shared + 1);
     const auto model = build<Dual<N>>(problem, chosen, local, static_cast<int>(l));
     Sums<N> sums;
-    Whitener housing(noise.housing_white_K, noise.housing_slow_K, noise.slow_s, log.width_s);
-    Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
-    double housing_slow[N + 1] = {}, core_slow[N + 1] = {};
+    Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
+    Predicted<N> of_housing, of_core;
     bool finite = true;
     // A further node brings two coordinates.
     constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
     replay<most_nodes>(
         model, log, housing0 + excess, housing0, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
           const Bin& bin = log.bins[k];
-          if (bin.housing_n > 0) {
-            finite = finite && std::abs(y2.v) < 1e5;
-            add<N>(sums, housing, housing_slow, y2, bin.housing_degC, static_cast<double>(bin.housing_n));
-          }
-          if (bin.core_n > 0) {
-            finite = finite && std::abs(y1.v) < 1e5;
-            add<N>(sums, core, core_slow, y1, bin.core_degC, static_cast<double>(bin.core_n));
-          }
-          housing.step();
-          core.step();
-          for (int i = 0; i <= N; ++i) housing_slow[i] *= housing.keep;
-          if (core.slow2 > 0) {
-            for (int i = 0; i <= N; ++i) core_slow[i] *= core.keep;
-          }
+          finite = finite && std::abs(y2.v) < 1e5 && std::abs(y1.v) < 1e5;
+          add<N>(sums, housing, of_housing, y2, bin.housing_degC, static_cast<double>(bin.housing_n));
+          if (log.has_core) add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n));
         });
     if (!finite || !std::isfinite(sums.misfit)) return false;
     out.misfit += sums.misfit;
@@ -381,11 +405,9 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 }
 
 double cost_of_noise(const Problem& problem) {
-  const Noise& noise = problem.noise;
   double sum = 0;
   for (const Bins& log : problem.logs) {
-    Whitener housing(noise.housing_white_K, noise.housing_slow_K, noise.slow_s, log.width_s);
-    Whitener core(noise.core_white_K, noise.core_slow_K, noise.slow_s, log.width_s);
+    Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
     const auto add = [&](Whitener& channel, double readings) {
       if (readings > 0) {
         channel.reading(readings);
@@ -435,8 +457,8 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
       f.x.size() - per_log_count * static_cast<Eigen::Index>(problem.logs.size() - static_cast<std::size_t>(l));
   const auto model = model_of(problem, f, l);
   Replayed out;
-  Whitener white(problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.slow_s, log.width_s);
-  double slow = 0;
+  Whitener white = Whitener::housing(problem.noise, log.width_s);
+  double wander = 0, disturbance = 0;
   replay<4>(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
     const Bin& bin = log.bins[k];
     out.housing_degC.push_back(y2);
@@ -446,12 +468,14 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
     double w = missing;
     if (bin.housing_n > 0) {
       white.reading(static_cast<double>(bin.housing_n));
-      w = (bin.housing_degC - y2 - slow) * white.weight;
-      slow += white.gain * w / white.weight;
+      w = (bin.housing_degC - y2 - wander - disturbance) * white.weight;
+      wander += white.gain * w / white.weight;
+      disturbance += white.gain_disturbed * w / white.weight;
     }
     out.whitened.push_back(w);
     white.step();
-    slow *= white.keep;
+    wander *= white.keep;
+    disturbance *= white.keep_disturbed;
   });
   return out;
 }

@@ -25,10 +25,12 @@ struct Belief {
   double winding_max_degC = 155;
 };
 
-/// A housing reading = truth + white + slow; the mean of n readings has white / sqrt(n).
+/// A reading = truth + white + slow, slow a first-order process; the mean of n readings has white / sqrt(n). Where a
+/// model is known to be off for reasons without a name, a disturbance comes on top: as slow, with its own time constant.
 struct Noise {
   double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
-  double core_white_K = 1, core_slow_K = 0;
+  double core_white_K = 1, core_slow_K = 0;  // slow 0: read so rarely that all is white
+  double disturbance_K = 0, disturbance_s = 60;  // of the housing; a winding that wanders more is disturbed more
   double idle_s = 0;  // how much rest it was taken from; 0: assumed
 };
 

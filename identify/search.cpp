@@ -121,11 +121,10 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   // again each time: coarser than that loses a gain of three.
   for (const double slow_s : {60.0, 240.0}) {
     Problem disturbed = problem;
-    disturbed.noise.slow_s = slow_s;
+    disturbed.noise.disturbance_s = slow_s;
     Fit warm = undisturbed;
-    for (double factor = 1.5; factor < 1000; factor *= 1.6) {
-      disturbed.noise.housing_slow_K = factor * problem.noise.housing_slow_K;
-      disturbed.noise.core_slow_K = factor * problem.noise.core_slow_K;
+    for (double factor = 0.6; factor < 1000; factor *= 1.6) {
+      disturbed.noise.disturbance_K = factor * problem.noise.housing_slow_K;
       Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
       if (f.x.size() == 0) break;
       const double reached = evidence(disturbed, f);
@@ -290,7 +289,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
   const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
   const bool disturbed =
-      without_causes.gain > margins.remains && without_causes.noise.housing_slow_K > margins.noticeable_K;
+      without_causes.gain > margins.remains && without_causes.noise.disturbance_K > margins.noticeable_K;
   if (gain <= margins.detect || (moves < margins.noticeable_K && !disturbed)) {
     out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
     say(gain > margins.detect
@@ -301,7 +300,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
             : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
                           margins.detect, first, gain));
     if (disturbed)
-      say(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.", without_causes.noise.housing_slow_K,
+      say(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.", without_causes.noise.disturbance_K,
                       without_causes.gain));
     return out;
   }
@@ -317,7 +316,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   if (left_by_leader.gain > margins.remains) {
     judged.noise = left_by_leader.noise;
     say(fmt::format("Even the best set, {}, leaves a slow disturbance of {:.2f} K, which from here on counts as noise.",
-                    listed(leader.fit.chosen), judged.noise.housing_slow_K));
+                    listed(leader.fit.chosen), judged.noise.disturbance_K));
     fit_alone(judged, all, field);
     fit_pairs(judged, field);
   }
@@ -344,7 +343,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const bool complete = left.gain < margins.remains;
   const Rmse missed = rmse_of(problem, out.base.fit);
   const double before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
-  const double after_K = left.noise.housing_slow_K;
+  const double after_K = left.noise.disturbance_K;
   const bool mostly = (single && explains > margins.dominance * left.gain) || after_K < margins.small_part * before_K;
   const std::string remains = fmt::format(
       "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
