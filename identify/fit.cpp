@@ -318,6 +318,18 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
     if (!better) break;
     linearise();
   }
+  // Where a bound holds a coordinate, nothing was learned but the bound.
+  Eigen::MatrixXd narrowed = H;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double sd = c[static_cast<std::size_t>(i)].sd;
+    narrowed.row(i) *= sd;
+    narrowed.col(i) *= sd;
+    if (!held[static_cast<std::size_t>(i)]) continue;
+    narrowed.row(i).setZero();
+    narrowed.col(i).setZero();
+    narrowed(i, i) = 1;
+  }
+  out.narrowing = narrowed.ldlt().vectorD().array().abs().log().sum();
   out.x = x;
   out.gradient = g;
   out.information = H;
@@ -333,7 +345,7 @@ Fit descend(const Problem& problem, const std::vector<Chosen>& chosen, const std
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
 
-double Fit::bic() const { return 2 * cost + static_cast<double>(x.size()) * std::log(std::max(2, readings)); }
+double Fit::bic() const { return 2 * cost + narrowing; }
 
 Eigen::VectorXd Fit::std_errors() const {
   Eigen::MatrixXd A = information;

@@ -23,6 +23,7 @@ struct Fit {
   Eigen::MatrixXd from_data;    // of the data alone
   double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
   double misfit = 1e300;        // the same without prior
+  double narrowing = 0;         // logarithm of the prior's volume over the posterior's (Laplace), squared
   int readings = 0;             // whitened residuals that entered
   int iterations = 0;
   bool settled = false;  // a full step would lower the cost by less than 0.005: no decision changes
