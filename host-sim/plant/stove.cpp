@@ -54,10 +54,14 @@ double Stove::copper_degC() const {
 double Stove::magnet_degC() const { return d_.rotor_J_per_K > 0 ? T_degC_[rotor] : T_degC_[teeth]; }
 
 double Stove::phase_ohm(int phase, double speed_rad_per_s) const {
-  const double coefficient_per_K = d_.copper_coefficient_per_K + hidden_.copper_coefficient_per_K;
   const double ac = d_.ac_copper_s2 + hidden_.ac_copper_s2;
-  return d_.phase_resistance_ohm * (1 + coefficient_per_K * (T_degC_[phase] - 25)) *
+  const double share = hot_spot_W_per_K_ > 0 ? hidden_.hot_spot_share : 0;
+  return d_.phase_resistance_ohm * ((1 - share) * ohm_ratio(T_degC_[phase]) + share * ohm_ratio(T_degC_[hot_spot])) *
          (1 + ac * speed_rad_per_s * speed_rad_per_s);
+}
+
+double Stove::ohm_ratio(double copper_degC) const {
+  return 1 + (d_.copper_coefficient_per_K + hidden_.copper_coefficient_per_K) * (copper_degC - 25);
 }
 
 double Stove::sensed_degC() const {
@@ -99,7 +103,10 @@ Stove::Vector Stove::place_heat(const HeatDrive& drive, double& hidden_W) const 
   heat_W[housing] += housing_W;
   if (hot_spot_W_per_K_ > 0) {
     for (int k = 0; k < 3; ++k) {
-      const double moved_W = x.hot_spot_share * heat_W[k];
+      // The same current flows through both parts: each takes the heat of its own resistance.
+      const double there = x.hot_spot_share * ohm_ratio(T_degC_[hot_spot]);
+      const double here = (1 - x.hot_spot_share) * ohm_ratio(T_degC_[k]);
+      const double moved_W = there / (there + here) * heat_W[k];
       heat_W[k] -= moved_W;
       heat_W[hot_spot] += moved_W;
     }

@@ -195,9 +195,7 @@ Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const 
   Track out;
   const auto late = static_cast<long>(std::lround(delay_s / row_s));
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    out.core.push_back(hidden.hot_spot_J_per_K > 0 ? stove.winding_degC() * (1 - hidden.hot_spot_share) +
-                                                         stove.degC(host_sim::Place::hot_spot) * hidden.hot_spot_share
-                                                   : stove.winding_degC());
+    out.core.push_back(stove.copper_degC());
     out.housing.push_back(stove.degC(host_sim::Place::housing));
     out.sensed.push_back(stove.sensed_degC());
     const Row row = static_cast<long>(i) >= late ? rows[i - static_cast<std::size_t>(late)] : Row{0, 0};
