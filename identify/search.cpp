@@ -19,6 +19,7 @@ namespace {
 constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
+constexpr double least_slow_K = 0.02;  // below it a thermistor's slow noise hides behind its steps
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
 double ratio_of(const Fit& f) { return std::sqrt(2 * f.misfit / std::max(1, f.readings)); }
@@ -134,6 +135,20 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
     }
   }
   return out;
+}
+
+/// Rest shows the housing's slow noise, and with it what still flows inside the motor: never less than the noise. Where
+/// the best model's residual is likelier with less, less is taken; never more, or the noise would swallow what is wrong.
+void refine_housing_noise(Problem& problem, const Fit& best) {
+  const auto evidence = [&](const Problem& p) { return -fit(p, best.chosen, {&best}).bic() - 2 * cost_of_noise(p); };
+  Problem less = problem;
+  double most = evidence(problem);
+  for (less.noise.housing_slow_K *= 0.8; less.noise.housing_slow_K > least_slow_K; less.noise.housing_slow_K *= 0.8) {
+    const double reached = evidence(less);
+    if (reached < most) return;
+    most = reached;
+    problem.noise.housing_slow_K = less.noise.housing_slow_K;
+  }
 }
 
 /// Every cause alone, best first.
@@ -274,9 +289,11 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const auto all = available(problem, without);
   const auto say = [&](std::string step) { out.steps.push_back(std::move(step)); };
   fit_alone(problem, all, field);
-  const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
-  if (sparse_core && !field.singles.empty()) {
-    refine_core_noise(problem, field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit);
+  if (!field.singles.empty()) {
+    const Fit& best = field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
+    const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
+    refine_housing_noise(problem, best);
+    if (sparse_core) refine_core_noise(problem, best);
     fit_alone(problem, all, field);
   }
   out.base = out.chosen = field.base;
