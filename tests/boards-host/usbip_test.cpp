@@ -35,7 +35,8 @@ class Toy final : public Device {
     stall_ = false;
     const std::size_t length = static_cast<std::size_t>(r[6] | r[7] << 8);
     if (r[0] == 0x00 && r[1] == 5) next_ = r[2];
-    if (r[0] == 0x80 && r[1] == 6 && r[3] == 1) answer_ = {18, 1, 1, 2, 0, 0, 0, 64, 9, 0x12, 1, 0, 0, 1, 0, 0, 0, 1};
+    if (r[0] == 0x80 && r[1] == 6 && r[3] == 1) answer_ = {18, 1, 1, 2, 0, 0, 0, 64, 9, 0x12, 1, 0, 0, 1, 0, 0, 3, 1};
+    if (r[0] == 0x80 && r[1] == 6 && r[3] == 3 && r[2] == 3) answer_ = serial;
     if (r[0] == 0x80 && r[1] == 6 && r[3] == 2)
       answer_ = {9, 2, 32, 0, 1, 1, 0,  0xC0, 0, 9, 4, 0,    0, 2,  0xFF, 0,
                  0, 0, 7,  5, 1, 2, 64, 0,    0, 7, 5, 0x81, 2, 64, 0,    0};
@@ -71,6 +72,7 @@ class Toy final : public Device {
   void power_cycle() override { in_ = false; }
 
   std::atomic<bool> dead{false};  // silent from now on
+  Bytes serial{8, 3, 'T', 0, 7, 0, 0x61, 0x21};  // the second and third letter are not printable
 
  private:
   std::atomic<bool> in_ = false;
@@ -161,6 +163,7 @@ Bytes unlink(std::uint32_t sequence, std::uint32_t which) {
 }
 
 TEST_F(UsbIp, ListsAndImportsItsOneDevice) {
+  EXPECT_EQ(server.serial(), "T??");
   Client list(server.port());
   list.say({0x01, 0x11, 0x80, 0x05, 0, 0, 0, 0});
   const Bytes answer = list.hear(12 + 312 + 4);
