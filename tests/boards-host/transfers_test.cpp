@@ -188,6 +188,7 @@ TEST(Enumerate, EndsWithANoWhereNoDeviceAnswersAsOne) {
   EXPECT_FALSE(enumerates([](Scripted& d) { d.device.resize(17); }));
   EXPECT_FALSE(enumerates([](Scripted& d) { d.configuration.resize(8); }));
   EXPECT_FALSE(enumerates([](Scripted& d) { d.configuration.resize(40); }));
+  EXPECT_FALSE(enumerates([](Scripted& d) { d.configuration[2] = 0; })) << "no bytes at all, says its total length";
 }
 
 TEST(Enumerate, ADescriptorOfLengthZeroIsNoLoopWithoutEnd) {

@@ -9,7 +9,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <deque>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
 
@@ -37,9 +39,7 @@ class Toy final : public Device {
     if (r[0] == 0x00 && r[1] == 5) next_ = r[2];
     if (r[0] == 0x80 && r[1] == 6 && r[3] == 1) answer_ = {18, 1, 1, 2, 0, 0, 0, 64, 9, 0x12, 1, 0, 0, 1, 0, 0, 3, 1};
     if (r[0] == 0x80 && r[1] == 6 && r[3] == 3 && r[2] == 3) answer_ = serial;
-    if (r[0] == 0x80 && r[1] == 6 && r[3] == 2)
-      answer_ = {9, 2, 32, 0, 1, 1, 0,  0xC0, 0, 9, 4, 0,    0, 2,  0xFF, 0,
-                 0, 0, 7,  5, 1, 2, 64, 0,    0, 7, 5, 0x81, 2, 64, 0,    0};
+    if (r[0] == 0x80 && r[1] == 6 && r[3] == 2) answer_ = configuration;
     if (r[0] == 0xC0) stall_ = true;
     if (answer_.size() > length) answer_.resize(length);
     return {Answer::ack};
@@ -69,9 +69,12 @@ class Toy final : public Device {
     return a;
   }
   void run(double) override {}
-  void power_cycle() override { in_ = false; }
+  void power_cycle() override { in_ = false, ++power_cycles; }
 
   std::atomic<bool> dead{false};  // silent from now on
+  std::atomic<int> power_cycles = 0;
+  Bytes configuration{9, 2, 32, 0, 1, 1, 0,  0xC0, 0, 9, 4, 0,    0, 2,  0xFF, 0,
+                      0, 0, 7,  5, 1, 2, 64, 0,    0, 7, 5, 0x81, 2, 64, 0,    0};
   Bytes serial{8, 3, 'T', 0, 7, 0, 0x61, 0x21};  // the second and third letter are not printable
 
  private:
@@ -104,8 +107,10 @@ struct Client {
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     connected = connect(socket_, reinterpret_cast<sockaddr*>(&where), sizeof where) == 0;
   }
-  ~Client() { close(socket_); }
-  void say(const Bytes& bytes) { (void)!send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  ~Client() {
+    if (socket_ >= 0) close(socket_);
+  }
+  bool say(const Bytes& bytes) { return send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0; }
   /// Fewer than asked: the other side hung up.
   Bytes hear(std::size_t bytes) {
     Bytes all(bytes);
@@ -117,6 +122,12 @@ struct Client {
     }
     all.resize(at);
     return all;
+  }
+  /// Ends with a reset of the connection instead of a farewell.
+  void crash() {
+    const linger at_once{1, 0};
+    setsockopt(socket_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    close(std::exchange(socket_, -1));
   }
   /// Hung up by the other side, and not merely silent.
   bool cut_off() {
@@ -179,6 +190,51 @@ TEST_F(UsbIp, ListsAndImportsItsOneDevice) {
   EXPECT_EQ(get(first.device, 300), 0x12090001u);
   EXPECT_EQ(second.import(), 2u) << "one client has it: busy";
   EXPECT_EQ(other.import("2-1"), 1u) << "no such device";
+}
+
+TEST_F(UsbIp, TheListNamesInterfacesAsTheDeviceDescribesThemAndNoneTwice) {
+  const Bytes head = {9, 2, 0, 0, 3, 1, 0, 0xC0, 0}, first = {9, 4, 0, 0, 0, 0xFF, 1, 2, 0},
+              again = {9, 4, 0, 1, 0, 0xFE, 0, 0, 0}, second = {9, 4, 1, 0, 0, 2, 2, 0, 0};
+  const auto listed = [&](const std::vector<Bytes>& parts) {
+    Bytes all = head;
+    for (const Bytes& part : parts) all.insert(all.end(), part.begin(), part.end());
+    all[2] = static_cast<std::uint8_t>(all.size());
+    toy.configuration = all;
+    Client c(server.port());
+    for (int i = 0; i < 100 && c.import() != 0; ++i) usleep(2000);  // which looks at the device anew
+    Client list(server.port());
+    list.say({0x01, 0x11, 0x80, 0x05, 0, 0, 0, 0});
+    const Bytes answer = list.hear(12 + 312 + 3 * 4);
+    return answer.size() == 336 ? Bytes(answer.begin() + 324, answer.end()) : Bytes();
+  };
+  const Bytes one_of_three = {0xFF, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(listed({first, again, second}), (Bytes{0xFF, 1, 2, 0, 2, 2, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(listed({first, {0, 4}, second}), one_of_three) << "a descriptor without a length ends the list";
+  EXPECT_EQ(listed({first, {250, 4}, {0}}), one_of_three) << "one that is longer than what there is, too";
+  EXPECT_EQ(listed({first, second, first, again, second}), (Bytes{0xFF, 1, 2, 0, 2, 2, 0, 0, 0xFF, 1, 2, 0}));
+}
+
+TEST_F(UsbIp, AClientThatNeverReadsIsCutOff) {
+  Client c(server.port());
+  Bytes questions;
+  for (int i = 0; i < 1000; ++i) questions.insert(questions.end(), {0x01, 0x11, 0x80, 0x05, 0, 0, 0, 0});
+  int said = 0;
+  for (; said < 5000 && c.say(questions); ++said) usleep(1000);
+  EXPECT_LT(said, 5000) << "each answer has 328 B, and only so many are kept";
+  Client next(server.port());
+  EXPECT_EQ(next.import(), 0u);
+}
+
+TEST_F(UsbIp, AClientThatCrashesIsAPulledCable) {
+  Client c(server.port());
+  ASSERT_EQ(c.import(), 0u);
+  c.crash();
+  std::uint32_t status = 2;
+  for (int i = 0; i < 200 && status == 2; ++i) {
+    usleep(2000);
+    status = Client(server.port()).import();
+  }
+  EXPECT_EQ(status, 0u);
 }
 
 TEST_F(UsbIp, CarriesControlAndBulkTransfersAndStalls) {
@@ -295,6 +351,8 @@ TEST_F(UsbIp, AControlTransferThatContradictsItselfStalls) {
   EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPIPE);
   c.say(submit(2, 0, false, 2, {0, 0}, {0x80, 6, 0, 1, 0, 0, 2, 0}));  // OUT that says IN
   EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPIPE);
+  c.say(submit(3, 0, true, 2, {}, {0x00, 6, 0, 1, 0, 0, 2, 0}));  // IN that says OUT
+  EXPECT_EQ(static_cast<int>(get(c.hear(48), 20)), -EPIPE);
 }
 
 TEST_F(UsbIp, AMessageMayComeInPieces) {
@@ -310,6 +368,11 @@ TEST_F(UsbIp, AMessageMayComeInPieces) {
     c.say({byte});
     usleep(200);
   }
+  EXPECT_EQ(get(c.hear(48), 24), 3u);
+  const Bytes late = submit(2, 1, false, 3, {1, 2, 3});
+  c.say(Bytes(late.begin(), late.end() - 2));
+  usleep(20000);
+  c.say(Bytes(late.end() - 2, late.end()));
   EXPECT_EQ(get(c.hear(48), 24), 3u);
 }
 
@@ -388,6 +451,30 @@ TEST(UsbIpServer, SaysThatItsPortIsTaken) {
     EXPECT_NE(std::string(error.what()).find("is taken by another program: choose another with --port"),
               std::string::npos);
   }
+}
+
+TEST(UsbIpServer, SaysWhereItServesCutsThePowerOnAHangUpAndEndsOnCtrlC) {
+  Toy toy;
+  std::thread person([&] {
+    struct sigaction now{};
+    while (sigaction(SIGHUP, nullptr, &now) == 0 && now.sa_handler == SIG_DFL) usleep(1000);
+    kill(getpid(), SIGHUP);
+    while (toy.power_cycles == 0) usleep(1000);
+    kill(getpid(), SIGINT);
+  });
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(serve_until_interrupted(toy, 0, false), 0);
+  const std::string text = ::testing::internal::GetCapturedStdout();
+  person.join();
+  EXPECT_EQ(toy.power_cycles, 1);
+  EXPECT_NE(text.find("usbip --tcp-port "), std::string::npos) << text;
+  EXPECT_NE(text.find("attach -r 127.0.0.1 -b 1-1"), std::string::npos) << text;
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(serve_until_interrupted(toy, 0, true), 0) << "Ctrl-C was pressed: it says where, and ends";
+  const auto served = nlohmann::json::parse(::testing::internal::GetCapturedStdout(), nullptr, false);
+  EXPECT_EQ(served["bus_id"], "1-1");
+  EXPECT_EQ(served["serial"], "T??");
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);
 }
 
 TEST(UsbIpServer, SaysThatTheBoardDoesNotAnswer) {

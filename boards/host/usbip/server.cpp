@@ -156,7 +156,7 @@ void Server::part_if_device_left() {
 bool Server::read_from(Client& client) {
   std::uint8_t part[16384];
   const ssize_t got = recv(client.socket, part, sizeof part, 0);
-  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return false;
+  if (got == 0 || (got < 0 && errno != EAGAIN)) return false;
   if (got > 0) client.in.insert(client.in.end(), part, part + got);
   for (;;) {
     const int used = handle(client);
@@ -169,7 +169,7 @@ bool Server::read_from(Client& client) {
 bool Server::flush(Client& client) {
   if (client.out.empty()) return true;
   const ssize_t sent = send(client.socket, client.out.data(), client.out.size(), MSG_NOSIGNAL);
-  if (sent < 0) return (errno == EAGAIN || errno == EINTR) && client.out.size() <= longest_queue;
+  if (sent < 0) return errno == EAGAIN && client.out.size() <= longest_queue;
   client.out.erase(client.out.begin(), client.out.begin() + sent);
   return client.out.size() <= longest_queue;
 }
@@ -302,8 +302,8 @@ volatile std::sig_atomic_t interrupted = 0, power_cut = 0;
 
 int serve_until_interrupted(Device& device, std::uint16_t port, bool json) {
   Server server(device, port);
-  const std::string where = server.port() == usbip_port ? "" : fmt::format("--tcp-port {} ", server.port());
-  const std::string attach = fmt::format("modprobe vhci-hcd && usbip {}attach -r 127.0.0.1 -b {}", where, bus_id);
+  const std::string attach =
+      fmt::format("modprobe vhci-hcd && usbip --tcp-port {} attach -r 127.0.0.1 -b {}", server.port(), bus_id);
   if (json) {
     const nlohmann::ordered_json served = {{"serial", server.serial()}, {"bus_id", bus_id}, {"host", "127.0.0.1"},
                                            {"port", server.port()},     {"attach", attach}};

@@ -207,7 +207,7 @@ bool Transfers::enumerate() {
       serial_ += letter >= ' ' && letter <= '~' ? static_cast<char>(letter) : '?';
     }
   }
-  return configuration.bytes.size() == word(head.bytes, 2);
+  return configuration.bytes.size() >= head.bytes.size() && configuration.bytes.size() == word(head.bytes, 2);
 }
 
 }  // namespace boards::usb
