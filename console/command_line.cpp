@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "console/commands.hpp"
+#include "wire/pc/names.hpp"
 
 namespace console {
 namespace {
@@ -32,7 +33,30 @@ void add_options(CLI::App& app, Console& console) {
   app.add_flag("--json", console.options.json, "answer in JSON, one object a line");
 }
 
+/// Words that nobody asked for: the first is a command that is none, or too much.
+std::string unexpected(const CLI::App& app) {
+  const std::vector<std::string> left = app.remaining(true);
+  const std::string word = left.empty() ? "" : left.front();
+  if (!app.get_subcommands().empty() || word.rfind('-', 0) == 0)
+    return fmt::format("'{}' was not expected ('hotcore --help' shows how).", word);
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands({})) known.push_back(command->get_name());
+  const std::string hint = wire::pc::did_you_mean(word, known);
+  return fmt::format("There is no command '{}'{} 'hotcore --help' lists them.", word, hint.empty() ? ";" : hint);
+}
+
 }  // namespace
+
+CLI::Validator between(double least, double most) {
+  return CLI::Validator(
+      [=](std::string& text) {
+        double value = 0;
+        if (!CLI::detail::lexical_cast(text, value)) return fmt::format("'{}' is not a number", text);
+        if (value >= least && value <= most) return std::string();
+        return fmt::format("{} is out of range; it may be {:g} to {:g}", text, least, most);
+      },
+      most < longest_s ? fmt::format("{:g} to {:g}", least, most) : "");
+}
 
 void add_commands(CLI::App& app, Console& console) {
   app.fallthrough();  // options of the program may stand behind the command
@@ -56,6 +80,8 @@ int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {
   };
   try {
     parse(app);
+  } catch (const CLI::ExtrasError&) {
+    failed(unexpected(app), static_cast<int>(Exit::usage));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help
     failed(std::string(error.what()) + " ('hotcore --help' shows how).", static_cast<int>(Exit::usage));

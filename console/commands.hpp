@@ -17,6 +17,10 @@ void add_motion(CLI::App& app, Console& console);      // arm, mode, run, stop, 
 void add_records(CLI::App& app, Console& console);     // signals, watch, log, capture                   records.cpp
 void add_identify(CLI::App& app, Console& console);    // identify                                       identification.cpp
 
+/// For options: a number outside, NaN too, is refused with the range.
+CLI::Validator between(double least, double most);
+inline constexpr double longest_s = 1e9;  // of what a person lets run, 30 years
+
 /// All of them.
 void add_commands(CLI::App& app, Console& console);
 

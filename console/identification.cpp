@@ -27,14 +27,16 @@ std::string identify_program() {
   return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : "identify";
 }
 
-/// Runs it without a shell. Throws UserError (unusable) when it could not answer; it has said why.
-void run_identify(std::vector<std::string> arguments) {
+/// Runs it without a shell, for a program that reads JSON from us with its text on standard error. Throws UserError
+/// (unusable) when it could not answer; it has said why.
+void run_identify(std::vector<std::string> arguments, bool json) {
   arguments.insert(arguments.begin(), identify_program());
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   const pid_t child = fork();
   if (child == 0) {
+    if (json) dup2(STDERR_FILENO, STDOUT_FILENO);
     execvp(argv[0], argv.data());
     _exit(127);
   }
@@ -117,7 +119,8 @@ void identify(Console& console, const Arguments& a) {
                   axis, a.minutes, 2.5 * rated_A));
   const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
-  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"});
+  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"},
+               console.options.json);
 
   std::ifstream in(json);
   const auto answer = nlohmann::json::parse(in, nullptr, false);
@@ -170,7 +173,7 @@ void add_identify(CLI::App& app, Console& console) {
   command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   command->add_option("--minutes", a->minutes, "length of the course")
       ->capture_default_str()
-      ->check(CLI::Range(1.0, 240.0));
+      ->check(between(1.0, 240.0));
   command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
   command->add_flag("--yes", a->yes, "write what was found without asking");
   command->add_flag("--save", a->save, "and keep it over a reset");

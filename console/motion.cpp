@@ -117,10 +117,16 @@ void fault(Console& console, const std::string& axis, bool clear) {
 
 void ask(Console& console, const std::string& axis, const std::string& course) {
   std::vector<wire::Segment> segments;
+  float whole_s = 0;
   for (const Piece& piece : profile_in(course, wire::max_segments)) {
     if (piece.mode != wire::ControlMode::current)
       throw UserError(Exit::usage, "The look-ahead takes amperes; write the course as \"20A 0.3s, 6A 5s\".");
     segments.push_back({piece.seconds, piece.level});
+    whole_s += piece.seconds;
+  }
+  if (!(whole_s <= wire::longest_ask_s)) {
+    throw UserError(Exit::usage, fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
+                                             wire::longest_ask_s));
   }
   const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
   std::string text;
@@ -147,7 +153,7 @@ void add_motion(CLI::App& app, Console& console) {
     std::string axis;
     std::vector<std::string> course;  // quoted or not
     std::string mode;
-    float iq_A = 0, torque_Nm = 0, seconds = 1e9f;
+    float iq_A = 0, torque_Nm = 0, seconds = longest_s;
     bool clear = false;
   };
   const auto with_axis = [&](CLI::App* command, const std::string& otherwise, bool both) {
@@ -163,7 +169,7 @@ void add_motion(CLI::App& app, Console& console) {
   auto a = with_axis(command, "0", true);
   CLI::Option* const iq = command->add_option("--iq", a->iq_A, "amperes")->capture_default_str();
   CLI::Option* const torque = command->add_option("--torque", a->torque_Nm, "N m, in torque mode")->excludes(iq);
-  command->add_option("--seconds", a->seconds, "disarm by itself after so long");
+  command->add_option("--seconds", a->seconds, "disarm by itself after so long")->check(between(0, longest_s));
   command->callback([&console, a, torque] {
     arm(console, a->axis,
         torque->count() > 0 ? Piece{a->torque_Nm, a->seconds, wire::ControlMode::torque} : Piece{a->iq_A, a->seconds});

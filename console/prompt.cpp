@@ -86,15 +86,21 @@ int prompt(Console& console) {
   rl_readline_name = "hotcore";
   rl_attempted_completion_function = complete;
   rl_completer_word_break_characters = const_cast<char*>(" \t");
-  if (isatty(STDIN_FILENO) != 0)
-    fmt::print("Connected to {}. TAB completes, 'help' lists the commands, Ctrl-D ends.\n", console.session().name());
-  const Options usual = console.options;
   int code = 0;
+  if (isatty(STDIN_FILENO) != 0) {
+    code = run_line(console, [&](CLI::App&) {
+      console.tell(fmt::format("Connected to {}. TAB completes, 'help' lists the commands, Ctrl-D ends.",
+                               console.session().name()));
+    });
+    if (code != 0) return code;
+  }
+  const Options usual = console.options;
   for (std::string line; read_line(line);) {
-    const std::size_t first = line.find_first_not_of(" \t");
-    if (first == std::string::npos || line[first] == '#') continue;
-    if (line.substr(first) == "quit" || line.substr(first) == "exit") break;
-    if (line.substr(first) == "help") line = "--help";
+    line.erase(line.find_last_not_of(" \t\r") + 1);  // TAB leaves a blank behind what it completed
+    line.erase(0, line.find_first_not_of(" \t"));
+    if (line.empty() || line.front() == '#') continue;
+    if (line == "quit" || line == "exit") break;
+    if (line == "help") line = "--help";
     forget_interrupt();
     console.options = usual;
     code = run_line(console, [&](CLI::App& app) { app.parse(line); });

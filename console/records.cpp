@@ -29,10 +29,16 @@ void list_signals(Console& console, bool names_only) {
   console.say(text, json);
 }
 
-std::vector<Target> signals_named(Console& console, const std::vector<std::string>& names) {
+/// Of one axis only, if `axis` is one.
+std::vector<Target> signals_named(Console& console, const std::vector<std::string>& names, int axis = -1) {
   std::vector<Target> targets;
   for (const std::string& name : names) {
-    for (const Target& target : console.session().signals().named(name)) targets.push_back(target);
+    const std::size_t before = targets.size();
+    for (const Target& target : console.session().signals().named(name)) {
+      if (axis < 0 || target.axis == axis || target.axis == wire::no_axis) targets.push_back(target);
+    }
+    if (targets.size() == before)
+      throw UserError(Exit::usage, fmt::format("{} is not of axis {}; choose --axis, or leave it out.", name, axis));
   }
   if (targets.size() > wire::max_signals) {
     throw UserError(Exit::usage, fmt::format("{} signals are too many; {} go at once (axis0.NAME is one axis only).",
@@ -124,14 +130,8 @@ void log(Console& console, const std::vector<std::string>& names, const std::str
          double rate_Hz, double seconds) {
   Session& session = console.session();
   const int index = axis == "1" ? 1 : 0;
-  std::vector<Target> signals;
-  for (const Target& target : signals_named(console, names)) {
-    if (target.axis == index || target.axis == wire::no_axis) signals.push_back(target);
-  }
-  if (names.empty()) signals = usual_signals(session.signals(), index);
-  if (signals.empty()) {
-    throw UserError(Exit::usage, fmt::format("None of these signals is of axis {}; choose --axis.", index));
-  }
+  const std::vector<Target> signals =
+      names.empty() ? usual_signals(session.signals(), index) : signals_named(console, names, index);
   Recorder recorder(session, path, fmt::format("axis {}", index), signals, rate_Hz);
   console.tell(fmt::format("Logging axis {} at {:g} Hz; Ctrl-C ends it.", index, recorder.rate_Hz()));
   const double start_s = session.now_s();
@@ -235,7 +235,7 @@ void add_records(CLI::App& app, Console& console) {
   struct Arguments {
     std::vector<std::string> names;
     std::string axis = "both", path;
-    double rate_Hz = 20, seconds = 1e9;
+    double rate_Hz = 20, seconds = longest_s;
     bool names_only = false;
   };
   auto s = std::make_shared<Arguments>();
@@ -251,8 +251,8 @@ void add_records(CLI::App& app, Console& console) {
       ->check(CLI::IsMember({"0", "1", "both"}));
   command->add_option("--rate", w->rate_Hz, "states or rows a second")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 2000.0));
-  command->add_option("--seconds", w->seconds, "end by itself after so long");
+      ->check(between(0.01, 2000.0));
+  command->add_option("--seconds", w->seconds, "end by itself after so long")->check(between(0, longest_s));
   command->callback([&console, w] { watch(console, w->names, w->axis, w->rate_Hz, w->seconds); });
 
   auto l = std::make_shared<Arguments>();
@@ -263,8 +263,8 @@ void add_records(CLI::App& app, Console& console) {
   command->add_option("--axis", l->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   command->add_option("--rate", l->rate_Hz, "rows a second, at most the PWM frequency")
       ->capture_default_str()
-      ->check(CLI::Range(0.5, 1e6));
-  command->add_option("--seconds", l->seconds, "end by itself after so long");
+      ->check(between(0.5, 1e6));
+  command->add_option("--seconds", l->seconds, "end by itself after so long")->check(between(0, longest_s));
   command->callback([&console, l] { log(console, l->names, l->axis, l->path, l->rate_Hz, l->seconds); });
 
   auto c = std::make_shared<CaptureArguments>();
@@ -274,10 +274,12 @@ void add_records(CLI::App& app, Console& console) {
   command->add_option("--edge", c->edge, "now, or rising or falling through --level")
       ->capture_default_str()
       ->check(CLI::IsMember({"now", "rising", "falling"}));
-  command->add_option("--level", c->level, "in the trigger's unit")->capture_default_str();
-  command->add_option("--pre", c->pre, "rows before the trigger")->capture_default_str();
-  command->add_option("--post", c->post, "rows from the trigger on")->capture_default_str();
-  command->add_option("--decimation", c->decimation, "PWM periods a row")->capture_default_str();
+  command->add_option("--level", c->level, "in the trigger's unit")->capture_default_str()->check(between(-1e30, 1e30));
+  command->add_option("--pre", c->pre, "rows before the trigger")->capture_default_str()->check(between(0, 65535));
+  command->add_option("--post", c->post, "rows from the trigger on")->capture_default_str()->check(between(1, 65535));
+  command->add_option("--decimation", c->decimation, "PWM periods a row")
+      ->capture_default_str()
+      ->check(between(1, 65535));
   command->add_option("--out", c->path, "a .csv file")->capture_default_str();
   command->callback([&console, c] { capture(console, *c); });
 }

@@ -123,6 +123,7 @@ struct Ask {
   std::uint16_t zero = 0;
 };
 inline constexpr int max_segments = 16;
+inline constexpr float longest_ask_s = 60.0f;  // all segments together
 
 struct SignalAddress {
   std::uint8_t id;

@@ -136,6 +136,7 @@ void Link::look_ahead() {
     constexpr float standing = 1.0f, turning = 0.5f;  // mean(i_k^2) / |i|^2
     const float share = ask.standing != 0 ? standing : turning;
     const thermal::PhaseShares shares{{share, share, share}};
+    static_assert(wire::longest_ask_s == thermal::ProfileRun::most_s);
     thermal::Piece pieces[wire::max_segments]{};
     const int count = static_cast<int>((errand_bytes_ - sizeof ask) / sizeof(wire::Segment));
     for (int i = 0; i < count; ++i) {

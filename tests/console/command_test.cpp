@@ -403,6 +403,29 @@ TEST_F(Commands, WrongCommandLinesGetOneSentence) {
   refused("set current_limit_A", 2, "write name=value");
   refused("capture axis0.iq_A --pre 2000 --post 2000", 2, "at most 1024 rows");
   refused("log --out /proc/nowhere/x.csv --seconds 1", 2, "cannot be written");
+  refused("captre iq_A", 2, "There is no command 'captre', did you mean 'capture'?");
+  refused("stop now", 2, "'now' was not expected");
+  refused("get --bogus", 2, "'--bogus' was not expected");
+  refused("set current_limit_A=5 axis1.current_limit_A=6", 2, "axis1.current_limit_A is given twice");
+}
+
+TEST_F(Commands, ANumberOutOfRangeGetsTheRangeBeforeAnythingMoves) {
+  refused("arm --seconds -1", 2, "--seconds: -1 is out of range; it may be 0 to 1e+09");
+  refused("watch --rate nan", 2, "nan is out of range; it may be 0.01 to 2000");
+  refused("log --out " + path("x.csv") + " --rate 0", 2, "it may be 0.5 to 1e+06");
+  refused("log --out " + path("x.csv") + " --rate fast", 2, "'fast' is not a number");
+  refused("capture iq_A --pre -1", 2, "it may be 0 to 65535");
+  refused("capture iq_A --post 0", 2, "it may be 1 to 65535");
+  refused("capture iq_A --edge rising --level nan", 2, "nan is out of range");
+  refused("ask \"5A 2min\"", 2, "The course lasts 120 s; the board looks 60 s ahead");
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(Commands, ALogIsOfOneAxisAndLeavesNothingOutInSilence) {
+  refused("log --out " + path("x.csv") + " axis0.iq_A axis1.iq_A --seconds 0.1", 2, "axis1.iq_A is not of axis 0");
+  EXPECT_TRUE(is_empty());
+  EXPECT_EQ(say("log --out " + path("x.csv") + " axis1.iq_A bus_V --axis 1 --seconds 0.1").code, 0);
+  EXPECT_NE(content(path("x.csv")).find("time_s,iq_A,bus_V\n"), std::string::npos);
 }
 
 TEST_F(Commands, WithJsonAnErrorIsJsonToo) {

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Completion as a person at a terminal has it: the function of hotcore.bash with the words bash would hand it, then the
-# TAB key in an interactive bash and at the prompt of hotcore, both on a pseudo-terminal.   completion.sh HOTCORE hotcore.bash
+# What a person at a terminal has: completion by the function of hotcore.bash with the words bash would hand it, then the
+# TAB key in an interactive bash and at the prompt of hotcore, both on a pseudo-terminal, the prompt without a board, and
+# every option in the manual page.   completion.sh HOTCORE hotcore.bash hotcore.1
 set -uo pipefail
-hotcore=$1 completion=$2
+hotcore=$1 completion=$2 manual=$3
 export HOTCORE_SIM_FAST=1 TERM=dumb
 source "$completion"
 failures=0
@@ -34,4 +35,17 @@ said=$(printf 'PATH=%s:$PATH\nsource %s\nhotcore --sim get axis0.pole\t\nexit\n'
 check "TAB in an interactive bash" "$(grep -o '^axis0.pole_pairs  *1 ' <<<"$said" | tr -s ' ')" "axis0.pole_pairs 1 "
 said=$(printf 'get axis1.pole\t\nquit\n' | typed "$hotcore --sim")
 check "TAB at the prompt" "$(grep -o '^axis1.pole_pairs  *1 ' <<<"$said" | tr -s ' ')" "axis1.pole_pairs 1 "
+said=$(typed "$hotcore --serial NOBODY")
+check "the prompt without a board: exit code 4, one line" "$? $(wc -l <<<"$said") ${said:0:8}" "4 1 No board"
+
+# paragraph COMMAND: what the manual says of it.
+paragraph() { sed 's/\\-/-/g; s/\\f.//g' "$manual" | awk -v c="$1" '/^\.TP/ { on = 0; getline; on = $2 == c } on'; }
+untold=""
+for c in $("$hotcore" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
+  [ -n "$(paragraph "$c")" ] || untold+=" $c"
+  for o in $("$hotcore" "$c" --help | sed -n 's/^  \(-h,\)\{0,1\}\(--[a-z]*\).*/\2/p' | grep -v '^--help$'); do
+    paragraph "$c" | grep -q -- "$o\b" || untold+=" '$c $o'"
+  done
+done
+check "commands and options that hotcore.1 does not tell" "$untold" ""
 exit $((failures > 0))
