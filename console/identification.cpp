@@ -101,6 +101,8 @@ bool agreed(Console& console, const Arguments& a) {
   std::fflush(stdout);
   std::string answer;
   std::getline(std::cin, answer);
+  std::cin.clear();  // Ctrl-C ended it, and the prompt may ask again
+  stop_if_interrupted("Stopped; nothing was written.");
   return answer == "y" || answer == "yes";
 }
 

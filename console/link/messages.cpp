@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 
 namespace console::link {
@@ -69,15 +70,18 @@ std::optional<wire::Answer> answer_in(const wire::Frame& frame, wire::Kind kind)
 }
 
 std::optional<wire::Hello> hello_in(const wire::Frame& frame) {
-  auto hello = message_in<wire::Hello>(frame, wire::Kind::hello);
-  if (!hello) return {};
-  tidy(hello->board);
-  tidy(hello->firmware);
-  tidy(hello->serial);
-  if (hello->protocol != wire::protocol_version) return hello;  // whatever else it says means something else
-  const bool sane = hello->axes >= 1 && hello->axes <= wire::axis_count && hello->pwm_Hz >= 1000.0f &&
-                    hello->pwm_Hz <= 1e6f && hello->max_payload <= wire::max_payload;
-  return sane ? hello : std::nullopt;
+  const auto answer = answer_in(frame, wire::Kind::hello);
+  if (!answer || answer->status != 0 || frame.bytes < offsetof(wire::Hello, max_payload)) return {};
+  wire::Hello hello{};
+  std::memcpy(&hello, frame.payload, std::min<std::size_t>(frame.bytes, sizeof hello));
+  tidy(hello.board);
+  tidy(hello.firmware);
+  tidy(hello.serial);
+  // Of another version, whatever else it says means something else, and it may be shorter.
+  if (hello.protocol != wire::protocol_version) return hello;
+  const bool sane = frame.bytes >= sizeof hello && hello.axes >= 1 && hello.axes <= wire::axis_count &&
+                    hello.pwm_Hz >= 1000.0f && hello.pwm_Hz <= 1e6f && hello.max_payload <= wire::max_payload;
+  return sane ? std::optional(hello) : std::nullopt;
 }
 
 std::optional<Description> parameter_in(const wire::Frame& frame) {

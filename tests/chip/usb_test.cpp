@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <string>
 
 #include "tests/chip/plugged.hpp"
 
@@ -284,6 +285,12 @@ TEST(Usb, BothAxesExchangeSetpointAndStateMoreThanAThousandTimesASecond) {
         cycles, per_s, 1e6 * trips_s[trips_s.size() / 2], 1e6 * trips_s[trips_s.size() * 99 / 100],
         1e6 * trips_s.back(), static_cast<unsigned long long>(lane.worst),
         static_cast<double>(lane.total) / static_cast<double>(lane.calls));
+    for (std::size_t from = 0, to = 0; from < trips_s.size(); from = to) {  // round trips by 20 us
+      const auto slot = static_cast<int>(trips_s[from] / 20e-6);
+      while (to < trips_s.size() && static_cast<int>(trips_s[to] / 20e-6) == slot) ++to;
+      std::printf("  %4d us %6zu %s\n", 20 * slot, to - from,
+                  std::string(1 + 60 * (to - from) / trips_s.size(), '#').c_str());
+    }
     EXPECT_GT(per_s, 1000);
     EXPECT_EQ(p.pcb->chip.resets(), 0);
     NO_TROUBLE_ON_USB(p);

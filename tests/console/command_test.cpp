@@ -259,6 +259,10 @@ TEST_F(Commands, AnotherProtocolIsSaidSo) {
   refused("get", 9, "use a newer hotcore");
   board_->protocol = 0;
   refused("get", 9, "update the firmware");
+  board_->twist = [](Kind k, std::vector<std::uint8_t>& payload) {
+    if (k == Kind::hello) payload.resize(12);  // an older one may be shorter
+  };
+  refused("get", 9, "speaks protocol 0 and this program");
 }
 
 TEST_F(Commands, ABoardThatGoesAwayDuringSaveSaysSo) {
