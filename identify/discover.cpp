@@ -270,7 +270,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
     tell(problem, found, report);
     // Where the data cannot choose, a board must not take the milder model for true.
     if (extended && found.verdict == Verdict::ambiguous) {
-      std::vector<const Fit*> open = {written, &two};
+      std::vector<const Fit*> open = {written};
       for (const Candidate& c : found.sets) {
         if (c.tied) open.push_back(&c.fit);
       }

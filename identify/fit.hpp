@@ -42,7 +42,11 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
-/// What the noise model itself costs, half the sum of ln variance of all predicted readings: to compare fits that assume
+/// What no motor is without: a housing that is not one mass and a sensor that is not quite on it, so that its reading
+/// comes early or late by seconds. Causes are to be ranked by more than that. `two_resistors`: the baseline's fit.
+std::vector<Imperfections> ordinary_imperfections(const Problem& problem, const Fit& two_resistors);
+
+/// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.
 double cost_of_noise(const Problem& problem);
 

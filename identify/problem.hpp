@@ -3,6 +3,7 @@
 // are.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,10 +35,18 @@ struct Noise {
   double idle_s = 0;  // how much rest it was taken from; 0: assumed
 };
 
+/// What imperfections of ordinary size do to the readings of one log: a row each, a column for each bin.
+struct Imperfections {
+  Eigen::MatrixXd housing_K, core_K;
+};
+
 struct Problem {
   std::vector<Bins> logs;
   Belief belief;
   Noise noise;
+  /// For each log, what any motor may have of its own beside the model: a fit averages over them (prior standard
+  /// deviation 1, in units of the ordinary size). Empty: the model is exact.
+  std::vector<Imperfections> ordinary;
   double heat_W = 1;  // mean copper heat, and means of the drives: the scales of cause.hpp
   double drive_mean[thermal::drive_count] = {};
   double rms_A = 1, speed08_mean = 1, duration_s = 1;

@@ -114,9 +114,12 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const Bins& log, const S& core_d
   if (model.hot_node >= 0) T[model.hot_node] = core_degC;
   const int housing = set.housing.node;
   const bool lags = value_of(set.housing.lag_s) > 0;
-  S lagged = housing_degC, keep(0);
+  S lagged = housing_degC, keep(0), mean_keep(0);
   using std::exp;
-  if (lags) keep = exp(-log.width_s / set.housing.lag_s);
+  if (lags) {
+    keep = exp(-log.width_s / set.housing.lag_s);
+    mean_keep = (1.0 - keep) * set.housing.lag_s / log.width_s;
+  }
 
   for (std::size_t k = 0; k < log.bins.size(); ++k) {
     const Bin& bin = log.bins[k];
@@ -128,10 +131,12 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const Bins& log, const S& core_d
     }
     S seen = T[housing] + (next[housing] - T[housing]) * static_cast<double>(bin.housing_at);
     if (lags) {
-      // The sensor follows the mean of the bin; its own state is read at the same place of the bin.
-      const S mean = (T[housing] + next[housing]) * 0.5, after = mean + (lagged - mean) * keep;
-      seen = lagged + (after - lagged) * static_cast<double>(bin.housing_at);
-      lagged = after;
+      // Behind a ramp a first-order sensor stays by slope times lag, and what it was off by before fades away; readings
+      // that are spread over the bin see the mean of that.
+      const S behind = (next[housing] - T[housing]) * set.housing.lag_s / log.width_s, off = lagged - T[housing] + behind;
+      seen -= behind;
+      seen += off * (bin.housing_n > 1 ? mean_keep : exp(-log.width_s * static_cast<double>(bin.housing_at) / set.housing.lag_s));
+      lagged = next[housing] - behind + off * keep;
     }
     seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);
     S core = T[model.core] + (next[model.core] - T[model.core]) * static_cast<double>(bin.core_at);

@@ -288,6 +288,17 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Field field;
   const auto all = available(problem, without);
   const auto say = [&](std::string step) { out.steps.push_back(std::move(step)); };
+  problem.ordinary = ordinary_imperfections(problem, fit(problem, {}));
+  // A board runs the model alone: what is handed on was fitted without leeway, to the noise that was judged by.
+  const auto hand_on = [&](Problem exact) {
+    exact.ordinary.clear();
+    const auto refit = [&](Fit& f) { f = fit(exact, f.chosen, {&f}); };
+    refit(out.base.fit);
+    refit(out.chosen.fit);
+    for (Candidate& c : out.sets) {
+      if (c.tied) refit(c.fit);
+    }
+  };
   fit_alone(problem, all, field);
   if (!field.singles.empty()) {
     const Fit& best = field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
@@ -319,6 +330,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     if (disturbed)
       say(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.", without_causes.noise.disturbance_K,
                       without_causes.gain));
+    hand_on(problem);
     return out;
   }
 
@@ -392,6 +404,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     out.verdict = complete ? Verdict::explained : Verdict::partly_explained;
     say(fmt::format("No other set comes within {:.0f}; {}.", margins.tie, remains));
   }
+  hand_on(judged);
   return out;
 }
 

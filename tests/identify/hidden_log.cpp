@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <random>
+#include <stdexcept>
 
 #include "wire/pc/motor_file.hpp"
 
@@ -38,6 +40,7 @@ struct Draw {
 };
 
 constexpr double row_s = 0.1;
+constexpr double least_error_K = 1, largest_error_K = 10;  // of the winding, or the reading, before any refit
 
 /// What a robot's joint does: stand, hold, walk with a gait ripple, push, spin, rest.
 std::vector<Row> robot_duty(Draw& d, double rms_A, double top, double seconds) {
@@ -232,8 +235,11 @@ std::vector<std::string> outside() {
   return {"latent", "gusts", "contact", "grease", "thermostat", "curing", "overload"};
 }
 
-HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
-  Draw d{std::mt19937_64(o.seed * 7919 + 17)};
+namespace {
+
+/// One draw; nothing is written where an effect of this motor cannot be as large as it was drawn.
+std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, const std::string& path) {
+  Draw d{std::mt19937_64(o.seed * 7919 + 17 + draw * 6700417)};
   HiddenLog out;
   const MotorRow& row = motors[static_cast<std::size_t>(d.uniform(0, 0.9999) * static_cast<double>(std::size(motors)))];
   out.motor = row.name;
@@ -256,9 +262,9 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
   rms_A = std::min(rms_A, std::sqrt(60 / (1.5 * m.phase_resistance_ohm * 1.4 * m.R1_K_per_W)) / 1.6);
   const double top = d.uniform(250, 600), ambient = d.uniform(18, 30);
   const double start = d.uniform(0, 1) < 0.6 ? ambient : ambient + d.uniform(0, 12);
-  const auto duty = [&](Draw& draw) {
-    return o.duty == Duty::robot ? robot_duty(draw, rms_A, top, o.seconds)
-                                 : designed_profile(draw, rms_A * 0.95, top, o.seconds);
+  const auto duty = [&](Draw& of) {
+    return o.duty == Duty::robot ? robot_duty(of, rms_A, top, o.seconds)
+                                 : designed_profile(of, rms_A * 0.95, top, o.seconds);
   };
   auto rows = duty(d);
   auto neighbour = wandering(d, rows.size(), ambient, 180);
@@ -280,9 +286,10 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
   HiddenEffects hidden;
   double delay_s = 0;
   const Track clean = run(m, options, hidden, 0, rows, ambient, start, neighbour, frame, o.seed);
-  for (std::size_t e = 0; e < o.effects.size(); ++e) {
+  for (std::size_t e = 0; o.strength > 0 && e < o.effects.size(); ++e) {
     const bool other = d.uniform(0, 1) < 0.5;
-    const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds, wanted = d.log_uniform(1, 10) * o.strength;
+    const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds;
+    const double wanted = d.log_uniform(least_error_K, largest_error_K) * o.strength;
     double a = 0.2 * sign, error = 0;
     for (int i = 0; i < 4; ++i) {
       HiddenEffects one;
@@ -293,6 +300,7 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
       if (!(error > 1e-6) || std::abs(error / wanted - 1) < 0.1) break;
       a = std::max(-6.0, std::min(6.0, a * std::max(0.1, std::min(10.0, wanted / error))));
     }
+    if (error < 0.9 * least_error_K * o.strength) return std::nullopt;
     hide(hidden, o.effects[e], a, m, mean_heat, rms_A, top, when, other, delay_s);
     out.core_error_K = std::max(out.core_error_K, error);
   }
@@ -340,6 +348,15 @@ HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
   }
   csv << text;
   return out;
+}
+
+}  // namespace
+
+HiddenLog make_hidden_log(const HiddenLogOptions& o, const std::string& path) {
+  for (std::uint64_t draw = 0; draw < 100; ++draw) {
+    if (auto log = drawn(o, draw, path)) return *log;
+  }
+  throw std::runtime_error("no motor shows an effect so large");
 }
 
 }  // namespace tests
