@@ -181,32 +181,6 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
 
 }  // namespace
 
-Search concluded(Problem& problem, const Margins& margins, const std::vector<std::string>& without) {
-  // Where the model is right, a lighter housing changes the winding's error by a hundredth or two; five are a
-  // contradiction.
-  constexpr double contradicted = 0.95;
-  constexpr double most_slow_K = 0.5;
-  Search found = search(problem, margins, without);
-  const bool sparse = problem.any_core() && problem.noise.core_slow_K == 0;
-  const auto overruled = [&] {
-    Problem lighter = problem;
-    lighter.noise.housing_slow_K *= 2;
-    const Fit& chosen = found.chosen.fit;
-    const Fit f = fit(lighter, chosen.chosen, {&chosen});
-    return f.x.size() > 0 && rmse_of(problem, f).core_K < contradicted * rmse_of(problem, chosen).core_K;
-  };
-  while (sparse && 2 * problem.noise.housing_slow_K <= most_slow_K && overruled()) {
-    problem.noise.housing_slow_K *= 2;
-    Search again = search(problem, margins, without);
-    again.steps.insert(again.steps.begin(),
-                       fmt::format("The winding's readings contradicted the best model; asked again with a housing "
-                                   "that may be off by {:.2f} K for other reasons.",
-                                   problem.noise.housing_slow_K));
-    found = std::move(again);
-  }
-  return found;
-}
-
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
   std::vector<ParameterLine> out;
   const Eigen::VectorXd sd = f.std_errors();
@@ -245,7 +219,7 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   std::string poor = too_poor(problem, base);
   Search found;
   if (poor.empty()) {
-    found = concluded(problem);
+    found = search(problem);
     poor = suspicion(problem, found, logs, motor);
     const bool veto_asked = held.fraction > 0 || !held.logs.empty();
     const std::string refused =

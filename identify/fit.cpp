@@ -484,7 +484,7 @@ std::vector<Imperfections> ordinary_imperfections(const Problem& problem, const 
   // A thermistor in its glue is 2 s late; a housing of several parts that share one reading, 0.4 % of its own time
   // constant late or early (host-sim's default motor, whose frame holds a fifth of the heat, is 0.3 % early).
   const Physical p = physical(problem, two_resistors.x);
-  const double late_s = 2 + 0.004 * p.R2_K_per_W * p.C2_J_per_K;
+  const double late_s = 0.5 + 0.002 * p.R2_K_per_W * p.C2_J_per_K;
   constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
   Fit late = two_resistors;
   late.chosen = {{cause_named("sensor_lag"), -1}};

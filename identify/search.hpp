@@ -22,7 +22,8 @@ struct Margins {
   /// 0.11 at least beside an imitation that was not complete (39 such logs, duty and designed,
   /// seeds 1..4, 21..32, 41..52).
   double small_part = 0.1;
-  double noticeable_K = 0.25;  // what a cause must move, rms, in the winding or at the sensor, to be worth a name
+  /// What a cause must move, rms, in the winding or at the sensor, to be worth a name: thrice a thermistor's slow wander.
+  double noticeable_K = 0.15;
 };
 
 struct Candidate {

@@ -101,6 +101,7 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   const double k = std::abs(a), G2 = 1 / m.R2_K_per_W;
   if (id == "speed_loss_linear") (other ? x.hysteresis_W_s : x.coulomb_drag_W_s) = k * heat_W / (0.3 * top);
   if (id == "speed_loss_quadratic") (other ? x.eddy_W_s2 : x.viscous_drag_W_s2) = k * heat_W / (0.15 * top * top);
+  if (id == "windage") x.windage_W_s3 = k * heat_W / (0.1 * top * top * top);
   if (id == "winding_eddy") x.winding_eddy_W_s2 = k * heat_W / (0.15 * top * top);
   if (id == "ac_copper_loss") x.ac_copper_s2 = k / (0.1 * top * top);
   if (id == "load_friction") x.load_friction_W_s_per_A = k * heat_W / (0.25 * top * rms_A);
@@ -140,6 +141,7 @@ std::vector<double> in_words_of_the_table(const std::string& id, const HiddenEff
                                           double delay_s) {
   if (id == "speed_loss_linear") return {x.hysteresis_W_s + x.coulomb_drag_W_s};
   if (id == "speed_loss_quadratic") return {x.eddy_W_s2 + x.viscous_drag_W_s2};
+  if (id == "windage") return {x.windage_W_s3};
   if (id == "winding_eddy") return {x.winding_eddy_W_s2};
   if (id == "ac_copper_loss") return {1.5 * m.phase_resistance_ohm * x.ac_copper_s2};
   if (id == "load_friction") return {x.load_friction_W_s_per_A};
@@ -224,11 +226,11 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
 }  // namespace
 
 std::vector<std::string> hideable() {
-  return {"speed_loss_linear",  "speed_loss_quadratic", "winding_eddy",     "ac_copper_loss", "load_friction",
-          "copper_coefficient", "bridge_loss",          "current_offset",   "board_heat",     "constant_heat",
-          "speed_cooling",      "natural_convection",   "radiation",        "cooling_change", "third_mass",
-          "hot_spot",           "neighbour_heat",       "frame_conduction", "sensor_lag",     "sensor_offset",
-          "sensor_gain",        "ambient_drift",        "clock_delay",      "stall_imbalance"};
+  return {"speed_loss_linear",  "speed_loss_quadratic", "windage",          "winding_eddy",     "ac_copper_loss",
+          "load_friction",      "copper_coefficient",   "bridge_loss",      "current_offset",   "board_heat",
+          "constant_heat",      "speed_cooling",        "natural_convection", "radiation",      "cooling_change",
+          "third_mass",         "hot_spot",             "neighbour_heat",   "frame_conduction", "sensor_lag",
+          "sensor_offset",      "sensor_gain",          "ambient_drift",    "clock_delay",      "stall_imbalance"};
 }
 
 std::vector<std::string> outside() {

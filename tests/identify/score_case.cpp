@@ -114,7 +114,7 @@ void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<
   for (identify::Log& more : read(log, path)) both.push_back(std::move(more));
   CaseResult again;
   Problem joint = identify::problem_of(both, sheet_of(log));
-  const Search now = identify::concluded(joint, options.margins, options.removed);
+  const Search now = identify::search(joint, options.margins, options.removed);
   again.truth = result.truth;
   again.verdict = now.verdict;
   again.answer = now.tied;
@@ -154,7 +154,7 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   std::sort(result.truth.begin(), result.truth.end());
   const std::clock_t start = std::clock();
   Problem problem = identify::problem_of(logs, sheet_of(log));
-  const Search found = identify::concluded(problem, options.margins, options.removed);
+  const Search found = identify::search(problem, options.margins, options.removed);
   result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.verdict = found.verdict;
   result.answer = found.tied;
