@@ -58,6 +58,10 @@ int main(int argc, char** argv) {
   argc -= json ? 1 : 0;
   const int count = argc > 1 ? std::atoi(argv[1]) : 64;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 5.0;
+  if (count < 1 || count > 1000 || !(seconds > 0 && seconds <= 3600)) {
+    fmt::print(stderr, "many_boards [BOARDS] [SECONDS] [--json]: 1 to 1000 boards, at most 3600 seconds.\n");
+    return 2;
+  }
   std::vector<std::unique_ptr<Board>> boards;
   for (int i = 0; i < count; ++i) boards.push_back(simulated(i));
   const wire::Axes both{3};

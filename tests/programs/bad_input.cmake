@@ -1,5 +1,5 @@
 # Bad input to the programs as a person meets it: one plain sentence on standard error, the documented exit code, and no
-# half-written file.   cmake -D IDENTIFY=... -D HOST_SIM=... -D MOTORS=... -D SCRATCH=... -P bad_input.cmake
+# half-written file.   cmake -D IDENTIFY=... -D HOST_SIM=... -D BIN=... -D MOTORS=... -D SCRATCH=... -P bad_input.cmake
 cmake_minimum_required(VERSION 3.25)
 file(REMOVE_RECURSE ${SCRATCH})
 file(MAKE_DIRECTORY ${SCRATCH})
@@ -81,6 +81,7 @@ refuse(hidden_seed 2 "seed=N" ${HOST_SIM} record duty --hide 7)
 refuse(profile_without_a_file 2 "no such file" ${HOST_SIM} record profile --profile nowhere.json)
 log(answer_without_advice.json "{\"experiment\": null}")
 refuse(profile_without_advice 2 "no experiment in it" ${HOST_SIM} record profile --profile answer_without_advice.json)
+refuse(no_board_at_all 2 "1 to 1000 boards" ${BIN}/many_boards none)
 refuse(free_shaft_repeated 2 "free shaft" ${HOST_SIM} record jump)
 
 if(failures)

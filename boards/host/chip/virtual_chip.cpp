@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   bool json = false;
   app.add_option("--scene", scene, "motors, shafts and supply of this scene of host-sim")->capture_default_str();
   app.add_option("--image", elf, "the flash image")->capture_default_str();
-  app.add_option("--port", port, "TCP port on loopback")->capture_default_str();
+  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   try {
     app.parse(argc, argv);

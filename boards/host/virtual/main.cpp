@@ -90,8 +90,11 @@ int main(int argc, char** argv) {
   bool chip = false, json = false;
   app.add_flag("--chip", chip, "the flash image on the chip model (virtual-chip --help)");
   app.add_option("--motor", motor, "on both axes; its parameters are set and saved")->capture_default_str();
-  app.add_option("--serial", serial, "serial number")->capture_default_str();
-  app.add_option("--port", port, "TCP port on loopback")->capture_default_str();
+  app.add_option("--serial", serial, "serial number")->capture_default_str()->check([](const std::string& s) {
+    constexpr std::size_t most = sizeof wire::Hello::serial - 1;
+    return s.size() <= most ? "" : fmt::format("{} characters; at most {} fit", s.size(), most);
+  });
+  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   if (std::find(argv, argv + argc, std::string("--chip")) != argv + argc) return become_chip(argv);
   try {
