@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Prints how long the four-parameter fit takes on one core (CPU time, after the logs are read): a benchmark, not a
-// test.
+// Prints how long the four-parameter fit, every cause alone, and the whole search with all pairs take on one core (CPU
+// time, after the logs are read; constant heat is hidden, so that the search goes to its end): a benchmark, not a test.
 //   build/host/bin/fit_speed [--json]
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "identify/fit.hpp"
+#include "identify/search.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "wire/pc/motor_file.hpp"
@@ -23,6 +23,7 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   options.rate_Hz = rate_Hz;
   options.core_every_s = core_every_s;
   const auto motor = wire::pc::read_motor("ec-powermax-30-24v", HOTCORE_SOURCE_DIR "/boards/motors");
+  options.extra_housing_W = [](double, double, double) { return 0.5; };
   options.motor = {1.5 * motor.motor.phase_resistance_ohm, 0.00393, 0.18, 6.0, 12.0, 190.0};
   const auto table = identify::read_table(tests::write_bench_log("hotcore_speed.csv", options));
   const double t0 = cpu_ms();
@@ -31,10 +32,20 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   const double t1 = cpu_ms();
   const identify::Fit f = identify::fit(problem, {});
   const double t2 = cpu_ms();
+  for (std::size_t c = 0; c < identify::causes().size(); ++c) {
+    const identify::Chosen alone{static_cast<int>(c), -1};
+    if (problem.possible(identify::causes()[c])) (void)identify::fit(problem, {alone}, {&f});
+  }
+  const double t3 = cpu_ms();
+  const std::string verdict = identify::word(identify::search(problem).verdict);
+  const double t4 = cpu_ms();
   if (json) {
     fmt::print("{}\n", nlohmann::ordered_json{{"log", what},
                                               {"fit_ms", t2 - t1},
                                               {"binning_ms", t1 - t0},
+                                              {"singles_ms", t3 - t2},
+                                              {"search_ms", t4 - t3},
+                                              {"verdict", verdict},
                                               {"rows", table.rows()},
                                               {"bins", problem.logs[0].bins.size()},
                                               {"iterations", f.iterations},
@@ -42,9 +53,11 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
                            .dump());
     return;
   }
-  fmt::print("{}: fit {:.1f} ms, binning {:.1f} ms ({} rows, {} bins of {:.1f} s, {} iterations, {})\n", what, t2 - t1,
-             t1 - t0, table.rows(), problem.logs[0].bins.size(), problem.logs[0].width_s, f.iterations,
-             f.settled ? "settled" : "NOT settled");
+  fmt::print(
+      "{}: fit {:.1f} ms, binning {:.1f} ms ({} rows, {} bins of {:.1f} s, {} iterations, {}); all causes alone {:.0f} "
+      "ms, the search with pairs {:.0f} ms ({})\n",
+      what, t2 - t1, t1 - t0, table.rows(), problem.logs[0].bins.size(), problem.logs[0].width_s, f.iterations,
+      f.settled ? "settled" : "NOT settled", t3 - t2, t4 - t3, verdict);
 }
 
 }  // namespace

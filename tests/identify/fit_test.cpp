@@ -158,6 +158,47 @@ TEST(Fit, WithHiddenHeatTheResidualIsNotWhiteAndTheStretchIsFound) {
   EXPECT_TRUE(hit);
 }
 
+Fit with_lag(const Fit& base, double lag_s) {
+  Fit late = base;
+  late.chosen = {{identify::cause_named("sensor_lag"), -1}};
+  late.x.resize(base.x.size() + 1);
+  late.x << base.x.head(identify::base_count), lag_s, base.x.tail(base.x.size() - identify::base_count);
+  return late;
+}
+
+TEST(Fit, ALagOfNothingChangesNothing) {
+  const Problem problem = problem_from(off_sheet(9));
+  const Fit base = identify::fit(problem, {});
+  const auto a = identify::replayed(problem, base, 0), b = identify::replayed(problem, with_lag(base, 0), 0);
+  for (std::size_t k = 0; k < a.housing_degC.size(); ++k)
+    ASSERT_NEAR(a.housing_degC[k], b.housing_degC[k], 0.02) << "bin " << k;  // K: 20 ms at 1 K/s
+}
+
+TEST(Fit, LeewayAveragesOverALagOfSecondsAndNotOverOneOfHalfAMinute) {
+  Problem problem = problem_from(off_sheet(9));
+  const Fit base = identify::fit(problem, {});
+  const auto gain = [&](double lag_s) {
+    Problem late = problem;
+    const auto reading = identify::replayed(problem, with_lag(base, lag_s), 0).housing_degC;
+    for (std::size_t k = 0; k < reading.size(); ++k) late.logs[0].bins[k].housing_degC += reading[k];
+    const auto plain = identify::replayed(problem, base, 0).housing_degC;
+    for (std::size_t k = 0; k < plain.size(); ++k) late.logs[0].bins[k].housing_degC -= plain[k];
+    const auto of = [&] {
+      const Fit two = identify::fit(late, {});
+      return 2 * (two.cost - identify::fit(late, {{identify::cause_named("sensor_lag"), -1}}, {&two}).cost);
+    };
+    const double exact = of();
+    late.ordinary = identify::ordinary_imperfections(late, identify::fit(late, {}));
+    return std::pair(exact, of());
+  };
+  const auto [seconds, seconds_with] = gain(2);
+  EXPECT_GT(seconds, 10) << "the data shows a lag of two seconds";
+  EXPECT_LT(seconds_with, 5) << "any housing may have one";
+  const auto [long_lag, long_with] = gain(30);
+  EXPECT_GT(long_with, 0.3 * long_lag);
+  EXPECT_GT(long_with, 100);
+}
+
 TEST(Fit, AnUnknownMotorIsFoundFromTheDataAlone) {
   const Problem problem = problem_from(off_sheet(2), false);
   const Fit f = identify::fit(problem, {});

@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
   app.add_option("--minutes", options.minutes, "of each log")->capture_default_str();
   app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
-  app.add_flag("--check", check, "end with an error when a motor that two resistors served well is spoilt");
+  app.add_flag("--check", check, "end with an error when a motor is served worse than by two resistors");
   app.add_flag("--json", json, "the cases as JSON");
   CLI11_PARSE(app, argc, argv);
 
@@ -94,7 +94,8 @@ int main(int argc, char** argv) {
     const Case c = played(options, first + static_cast<std::uint64_t>(s), folder);
     missed += !c.before.kept();
     helped += !c.before.kept() && c.after.kept();
-    harmed += c.before.kept() && !c.after.kept();
+    const bool hotter = c.after.overshoot_K > std::max(most_overshoot_K, c.before.overshoot_K);
+    harmed += (c.before.kept() && !c.after.kept()) || hotter;
     list.push_back({{"seed", c.seed},
                     {"truth", c.truth},
                     {"answer", c.answer},

@@ -79,6 +79,15 @@ TEST(Search, WithTheEffectSetToZeroNothingIsNamed) {
   }
 }
 
+TEST(Search, ASensorThatIsQuieterThanAssumedIsNoDisturbance) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  Hidden log = hidden({"neighbour_heat"}, 4242);
+  log.problem.noise.housing_slow_K *= 3;
+  const auto found = identify::search(log.problem);
+  EXPECT_EQ(found.verdict, Verdict::explained);
+  for (const std::string& step : found.steps) EXPECT_EQ(step.find("leaves a slow disturbance"), std::string::npos) << step;
+}
+
 TEST(Search, WithTheTrueCauseTakenOutOfTheTableItIsNotNamed) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const Hidden log = hidden({"neighbour_heat"}, 4242);
