@@ -23,7 +23,7 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   options.rate_Hz = rate_Hz;
   options.core_every_s = core_every_s;
   const auto motor = wire::pc::read_motor("ec-powermax-30-24v", HOTCORE_SOURCE_DIR "/boards/motors");
-  options.extra_housing_W = [](double, double, double) { return 0.5; };
+  options.extra_housing_W = [](double, double, double) { return 3.0; };
   options.motor = {1.5 * motor.motor.phase_resistance_ohm, 0.00393, 0.18, 6.0, 12.0, 190.0};
   const auto table = identify::read_table(tests::write_bench_log("hotcore_speed.csv", options));
   const double t0 = cpu_ms();
@@ -64,6 +64,6 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
 
 int main(int argc, char** argv) {
   const bool json = argc > 1 && std::string_view(argv[1]) == "--json";
-  measure("30 min at 10 Hz, housing and sparse winding", 1800, 10, 30, json);
+  measure("20 min at 10 Hz, housing and sparse winding", 1200, 10, 30, json);
   measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
 }
