@@ -309,8 +309,8 @@ double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
   return sum;
 }
 
-Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen, const std::vector<Coordinate>& c,
-            Eigen::VectorXd x, int most) {
+Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen,
+            const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
   const Eigen::Index n = x.size();
   Fit out;
   out.chosen = chosen;
@@ -408,7 +408,7 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
 
-double Fit::bic() const { return 2 * cost + narrowing; }
+double Fit::surprise() const { return 2 * cost + narrowing; }
 
 Eigen::VectorXd Fit::std_errors() const {
   Eigen::MatrixXd A = information;
@@ -477,7 +477,8 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     Fit f = descend(problem, leeway, chosen, c, x, starts.size() > 1 ? std::min(look, most) : most);
     if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
   }
-  return best.settled || best.x.size() == 0 || starts.size() == 1 ? best : descend(problem, leeway, chosen, c, best.x, most);
+  if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;
+  return descend(problem, leeway, chosen, c, best.x, most);
 }
 
 std::vector<Imperfections> ordinary_imperfections(const Problem& problem, const Fit& two_resistors) {

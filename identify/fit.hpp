@@ -23,7 +23,7 @@ struct Fit {
   Eigen::MatrixXd from_data;    // of the data alone
   double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
   double misfit = 1e300;        // the same without prior
-  double narrowing = 0;         // logarithm of the prior's volume over the posterior's (Laplace), squared
+  double narrowing = 0;         // twice the logarithm of the prior's volume over the posterior's (Laplace)
   int readings = 0;             // whitened residuals that entered
   int iterations = 0;
   bool settled = false;  // a full step would lower the cost by less than 0.005: no decision changes
@@ -32,7 +32,7 @@ struct Fit {
 
   int cause_coordinates() const;
   Eigen::VectorXd std_errors() const;  // of coordinates, from the data and the prior, bounds held
-  double bic() const;
+  double surprise() const;  // -2 ln of the model's evidence, up to what all models of the problem share
 };
 
 /// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause

@@ -27,7 +27,7 @@ struct Belief {
 };
 
 /// A reading = truth + white + slow, slow a first-order process; the mean of n readings has white / sqrt(n). Where a
-/// model is known to be off for reasons without a name, a disturbance comes on top: as slow, with its own time constant.
+/// model is known to be off for reasons without a name, a disturbance comes on top: another one, slower.
 struct Noise {
   double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
   double core_white_K = 1, core_slow_K = 0;  // slow 0: read so rarely that all is white

@@ -133,9 +133,11 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const Bins& log, const S& core_d
     if (lags) {
       // Behind a ramp a first-order sensor stays by slope times lag, and what it was off by before fades away; readings
       // that are spread over the bin see the mean of that.
-      const S behind = (next[housing] - T[housing]) * set.housing.lag_s / log.width_s, off = lagged - T[housing] + behind;
+      const S behind = (next[housing] - T[housing]) * set.housing.lag_s / log.width_s;
+      const S off = lagged - T[housing] + behind;
+      const double into_s = log.width_s * static_cast<double>(bin.housing_at);
       seen -= behind;
-      seen += off * (bin.housing_n > 1 ? mean_keep : exp(-log.width_s * static_cast<double>(bin.housing_at) / set.housing.lag_s));
+      seen += off * (bin.housing_n > 1 ? mean_keep : exp(-into_s / set.housing.lag_s));
       lagged = next[housing] - behind + off * keep;
     }
     seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);

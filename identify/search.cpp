@@ -26,7 +26,7 @@ double ratio_of(const Fit& f) { return std::sqrt(2 * f.misfit / std::max(1, f.re
 
 Candidate candidate(const Candidate& base, Fit f) {
   Candidate c;
-  c.gain = base.fit.bic() - f.bic();
+  c.gain = base.fit.surprise() - f.surprise();
   c.ratio = ratio_of(f);
   const double before = base.ratio * base.ratio - 1, after = c.ratio * c.ratio - 1;
   c.explained = before > 0 ? 1 - std::max(0.0, after) / before : 0;
@@ -115,7 +115,7 @@ struct Disturbance {
 };
 
 Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
-  const auto evidence = [](const Problem& p, const Fit& f) { return -f.bic() - 2 * cost_of_noise(p); };
+  const auto evidence = [](const Problem& p, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(p); };
   const double own = evidence(problem, undisturbed);
   Disturbance out{problem.noise, 0, own};
   // One to four minutes: slower ones are the model's own time constants, faster ones the sensor's wander. Half as large
@@ -138,9 +138,11 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
 }
 
 /// Rest shows the housing's slow noise, and with it what still flows inside the motor: never less than the noise. Where
-/// the best model's residual is likelier with less, less is taken; never more, or the noise would swallow what is wrong.
+/// the best model's residual is likelier with less, less is taken; never more: the noise would swallow what is wrong.
 void refine_housing_noise(Problem& problem, const Fit& best) {
-  const auto evidence = [&](const Problem& p) { return -fit(p, best.chosen, {&best}).bic() - 2 * cost_of_noise(p); };
+  const auto evidence = [&](const Problem& p) {
+    return -fit(p, best.chosen, {&best}).surprise() - 2 * cost_of_noise(p);
+  };
   Problem less = problem;
   double most = evidence(problem);
   for (less.noise.housing_slow_K *= 0.8; less.noise.housing_slow_K > least_slow_K; less.noise.housing_slow_K *= 0.8) {
@@ -167,7 +169,7 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
 
 /// The pairs that may come near the best one, fitted to the end, best first.
 std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, const std::vector<Candidate>& singles) {
-  const auto hoped = [](const Fit& f) { return f.bic() - 2 * f.promise; };
+  const auto hoped = [](const Fit& f) { return f.surprise() - 2 * f.promise; };
   std::vector<Fit> looks;
   for (std::size_t a = 0; a < singles.size(); ++a) {
     const Fit& better = singles[a].fit;
@@ -186,10 +188,10 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
   std::vector<Candidate> out;
   double best = 1e300;
   for (std::size_t i = 0; i < std::min(most_finished, looks.size()); ++i) {
-    const double errs = std::max(look_errs, look_errs_share * (base.fit.bic() - best));
+    const double errs = std::max(look_errs, look_errs_share * (base.fit.surprise() - best));
     if (i > 0 && hoped(looks[i]) > best + errs) break;
     Fit f = fit(problem, looks[i].chosen, {&looks[i]});
-    best = std::min(best, f.bic());
+    best = std::min(best, f.surprise());
     out.push_back(candidate(base, std::move(f)));
   }
   sort(out);

@@ -85,7 +85,8 @@ TEST(Search, ASensorThatIsQuieterThanAssumedIsNoDisturbance) {
   log.problem.noise.housing_slow_K *= 3;
   const auto found = identify::search(log.problem);
   EXPECT_EQ(found.verdict, Verdict::explained);
-  for (const std::string& step : found.steps) EXPECT_EQ(step.find("leaves a slow disturbance"), std::string::npos) << step;
+  for (const std::string& step : found.steps)
+    EXPECT_EQ(step.find("leaves a slow disturbance"), std::string::npos) << step;
 }
 
 TEST(Search, WithTheTrueCauseTakenOutOfTheTableItIsNotNamed) {
