@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Prints how long the four-parameter fit, every cause alone, and the whole search with all pairs take on one core (CPU
 // time, after the logs are read; constant heat is hidden, so that the search goes to its end): a benchmark, not a test.
-//   build/host/bin/fit_speed [--json]
+//   build/host/bin/fit_speed [--json] [--short]    short: not the ten hours, which take a minute
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -63,7 +64,8 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool json = argc > 1 && std::string_view(argv[1]) == "--json";
+  const auto said = [&](std::string_view word) { return std::find(argv + 1, argv + argc, word) != argv + argc; };
+  const bool json = said("--json");
   measure("20 min at 10 Hz, housing and sparse winding", 1200, 10, 30, json);
-  measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
+  if (!said("--short")) measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
 }

@@ -66,7 +66,7 @@ answers("before_trigger" ${hotcore} capture axis0.iq_A)
 answers("verdict;changes" ${hotcore} identify --minutes 1 --out i)
 answers("rule;install" ${BIN}/hotcore --json udev)
 answers("boards;lost" ${BIN}/many_boards 2 0.1 --json)
-answers("fit_ms" ${BIN}/fit_speed --json)
+answers("fit_ms" ${BIN}/fit_speed --json --short)
 # They serve until Ctrl-C: the line must have come before.
 answers("serial;bus_id;port" timeout --preserve-status -s INT 3 ${BIN}/virtual-board --port 0 --serial JSON1 --json)
 if(EXISTS ${IMAGE})
