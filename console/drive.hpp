@@ -37,9 +37,9 @@ struct Driven {
 /// all the same is held by a little iq.
 enum class Along { q, d };
 
-/// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError: refused when
-/// an axis trips or refuses a setpoint (as one that has another control mode does), interrupted after Ctrl-C, gone. The
-/// caller holds an Armed.
+/// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError: refused
+/// when an axis trips or refuses a setpoint (as one that has another control mode does), interrupted after Ctrl-C,
+/// gone. The caller holds an Armed.
 Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
              const std::function<void(const wire::State&, double)>& look);
 

@@ -82,8 +82,9 @@ Driven record(Console& console, int axis, const std::vector<Piece>& course, cons
       driven = drive(session, mask, course, Along::d, [&](const wire::State& state, double time_s) {
         if (time_s - told_s < length_s / 10) return;
         told_s = time_s;
-        console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed", 100 * time_s / length_s,
-                                 state.axis[axis].core_degC, std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
+        console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed",
+                                 100 * time_s / length_s, state.axis[axis].core_degC,
+                                 std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
                                  state.axis[axis].allowance_A));
       });
     }

@@ -63,9 +63,9 @@ std::string Live::table(const wire::State& state, double time_s) const {
     const char* holding = axis.fault != 0   ? wire::text_of(axis.fault).name
                           : axis.limit != 0 ? wire::text_of(axis.limit).name
                                             : "";
-    text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n", time_s,
-                        state.bus_V, a, mode_text(axis.mode), wire::text_of(axis.control), axis.id_A, axis.iq_A, axis.speed_rad_per_s, core,
-                        axis.housing_degC, axis.allowance_A, holding);
+    text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n",
+                        time_s, state.bus_V, a, mode_text(axis.mode), wire::text_of(axis.control), axis.id_A, axis.iq_A,
+                        axis.speed_rad_per_s, core, axis.housing_degC, axis.allowance_A, holding);
   }
   return text;
 }

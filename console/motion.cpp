@@ -125,8 +125,8 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
     whole_s += piece.seconds;
   }
   if (!(whole_s <= wire::longest_ask_s)) {
-    throw UserError(Exit::usage, fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
-                                             wire::longest_ask_s));
+    throw UserError(Exit::usage, fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.",
+                                             whole_s, wire::longest_ask_s));
   }
   const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
   std::string text;

@@ -69,16 +69,16 @@ std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
                       part));
     }
     if (!pieces.empty() && pieces.front().mode != piece.mode) {
-      throw UserError(Exit::usage, fmt::format("'{}' has another unit than the pieces before it; a course is of current "
-                                               "or of torque, write one or the other.",
-                                               part));
+      throw UserError(Exit::usage,
+                      fmt::format("'{}' has another unit than the pieces before it; a course is of current "
+                                  "or of torque, write one or the other.",
+                                  part));
     }
     pieces.push_back(piece);
   }
   if (pieces.empty() || pieces.size() > most) {
-    throw UserError(Exit::usage,
-                    fmt::format("The course has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
-                                pieces.size(), most));
+    throw UserError(Exit::usage, fmt::format("The course has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
+                                             pieces.size(), most));
   }
   return pieces;
 }

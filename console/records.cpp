@@ -184,8 +184,7 @@ void capture(Console& console, const CaptureArguments& a) {
   }
   std::vector<std::string> columns;
   for (const Target& signal : signals) columns.push_back(full_name(signal));
-  const std::string head =
-      preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level));
+  const std::string head = preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level));
   session.capture(order, signals);
   wire::CaptureStatus status = session.capture_status();
   if (status.phase == wire::CapturePhase::waiting) console.tell("Waiting for the trigger; Ctrl-C gives up.");

@@ -147,7 +147,7 @@ static_assert(2e6f * static_cast<float>(sample_cycles + conversion_cycles) / sta
               "two conversions must end before the other axis begins");
 static_assert((iwdg_reload + 1) * 4'000u / lsi_slowest_Hz < 35 && (iwdg_reload + 1) * 4'000u / lsi_fastest_Hz >= 12);
 static_assert(wwdg_steps * 4096u < pclk1_Hz / 500, "a hang of the fast lane: gates off within 2 ms");
-static_assert(pvd_irq.level < index0_irq.level && index0_irq.level < adc_irq.level &&
-              adc_irq.level < usb_irq.level && usb_irq.level < systick_level);
+static_assert(pvd_irq.level < index0_irq.level && index0_irq.level < adc_irq.level && adc_irq.level < usb_irq.level &&
+              usb_irq.level < systick_level);
 
 }  // namespace h8_15d

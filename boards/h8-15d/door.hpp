@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The debugger's door: a plain struct in RAM (symbol `door`) by which a debug probe commands and watches both axes. It
 // stays for tests and for boards whose USB is dead; whoever holds a probe could write any register anyway. The
-// same rules hold as for every host: setpoints age, arming is refused for its reasons, faults latch. Beside USB the last
-// word counts: the door is looked at in the main loop, and the USB interrupt waits while something new is there.
+// same rules hold as for every host: setpoints age, arming is refused for its reasons, faults latch. Beside USB the
+// last word counts: the door is looked at in the main loop, and the USB interrupt waits while something new is there.
 #pragma once
 
 #include <cstdint>

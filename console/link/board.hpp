@@ -10,9 +10,10 @@
 //   }
 //
 // No memory is taken after the constructor, neither here nor in the transports of this library. libusb itself (1.0.26,
-// submit_bulk_transfer in os/linux_usbfs.c) callocs one block for each transfer that it hands to the kernel and frees it
-// when the transfer is back; that is out of our hands. A frame that is torn or fails its CRC is counted and dropped; nothing that
-// a device sends is believed before it was checked (console/link/messages.hpp). Not for two threads at a time.
+// submit_bulk_transfer in os/linux_usbfs.c) callocs one block for each transfer that it hands to the kernel and frees
+// it when the transfer is back; that is out of our hands. A frame that is torn or fails its CRC is counted and dropped;
+// nothing that a device sends is believed before it was checked (console/link/messages.hpp). Not for two threads at a
+// time.
 #pragma once
 
 #include <array>

@@ -456,7 +456,7 @@ TEST(UsbIpServer, SaysThatItsPortIsTaken) {
 TEST(UsbIpServer, SaysWhereItServesCutsThePowerOnAHangUpAndEndsOnCtrlC) {
   Toy toy;
   std::thread person([&] {
-    struct sigaction now{};
+    struct sigaction now {};
     while (sigaction(SIGHUP, nullptr, &now) == 0 && now.sa_handler == SIG_DFL) usleep(1000);
     kill(getpid(), SIGHUP);
     while (toy.power_cycles == 0) usleep(1000);

@@ -132,7 +132,8 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   EXPECT_EQ(say("mode").out, "axis 0: current mode, setpoints in A\naxis 1: torque mode, setpoints in N m\n");
   EXPECT_NE(say("watch --json --seconds 0").out.find("\"control\":\"torque\""), std::string::npos);
   EXPECT_NE(say("watch --seconds 0").out.find("torque "), std::string::npos);
-  EXPECT_EQ(json("run \"50mNm 0.1s, 0Nm 0.1s\" --axis 1")["peak_A"].get<float>(), 0.05f);  // the script's board: as asked
+  EXPECT_EQ(json("run \"50mNm 0.1s, 0Nm 0.1s\" --axis 1")["peak_A"].get<float>(),
+            0.05f);  // the script's board: as asked
   EXPECT_EQ(say("arm --torque 0.2 --seconds 0.1 --axis 1").code, 0);
   refused("run \"20A 1s\" --axis 1", 8, "Axis 1 refused the setpoint 20 A: the setpoint has another unit");
   refused("run \"1Nm 1s\"", 8, "Axis 0 refused the setpoint 1 N m: the setpoint has another unit");

@@ -138,7 +138,8 @@ TEST_F(Typed, WhatIsWrongIsRefusedAndNothingStaysStaged) {
   EXPECT_EQ(type("set current_limit 5 2\n"), "name axis 0 or 1\r\n");
   EXPECT_EQ(type("set speed 5\n").substr(0, 17), "no such parameter");
   EXPECT_EQ(type("set\n").substr(0, 17), "no such parameter");
-  EXPECT_EQ(wait("set pole_pairs 2.5 1\n").substr(0, 34), "pole_pairs of axis 1: the value is") << "seen by the whole check";
+  EXPECT_EQ(wait("set pole_pairs 2.5 1\n").substr(0, 34), "pole_pairs of axis 1: the value is")
+      << "seen by the whole check";
   EXPECT_EQ(wait("set bus_low_end 60 0\n").substr(0, 11), "bus_low_sta");
   EXPECT_FALSE(board.parameters().uncommitted());
   EXPECT_EQ(wait("set ramp 0.25\n"), "ok\r\n") << "and the next one is not held up by it";

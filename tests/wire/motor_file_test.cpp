@@ -20,7 +20,8 @@ const std::string folder = HOTCORE_SOURCE_DIR "/boards/motors";
 /// The EC 16 file with one line replaced, in a place of its own.
 std::string file_with(const std::string& key, const std::string& line) {
   std::ifstream in(folder + "/ec-16-40w.toml");
-  const std::string path = ::testing::TempDir() + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".toml";
+  const std::string path =
+      ::testing::TempDir() + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".toml";
   std::ofstream out(path);
   for (std::string text; std::getline(in, text);) out << (text.rfind(key, 0) == 0 ? line : text) << '\n';
   return path;

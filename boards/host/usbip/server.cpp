@@ -305,8 +305,11 @@ int serve_until_interrupted(Device& device, std::uint16_t port, bool json) {
   const std::string attach =
       fmt::format("modprobe vhci-hcd && usbip --tcp-port {} attach -r 127.0.0.1 -b {}", server.port(), bus_id);
   if (json) {
-    const nlohmann::ordered_json served = {{"serial", server.serial()}, {"bus_id", bus_id}, {"host", "127.0.0.1"},
-                                           {"port", server.port()},     {"attach", attach}};
+    const nlohmann::ordered_json served = {{"serial", server.serial()},
+                                           {"bus_id", bus_id},
+                                           {"host", "127.0.0.1"},
+                                           {"port", server.port()},
+                                           {"attach", attach}};
     fmt::print("{}\n", served.dump());
   } else {
     fmt::print(

@@ -58,8 +58,8 @@ class Server {
   std::list<Client> clients_;
 };
 
-/// What a program around a server does: says how to attach (`json`: in one line of it), serves until Ctrl-C, returns its
-/// exit code. A SIGHUP cuts the device's power for a moment.
+/// What a program around a server does: says how to attach (`json`: in one line of it), serves until Ctrl-C, returns
+/// its exit code. A SIGHUP cuts the device's power for a moment.
 int serve_until_interrupted(Device& device, std::uint16_t port, bool json);
 
 }  // namespace boards::usb

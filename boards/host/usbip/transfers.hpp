@@ -28,7 +28,8 @@ class Transfers {
  public:
   explicit Transfers(Device& device) : device_(device) {}
 
-  /// Bus reset, address 1, device and configuration descriptors, serial number. False: nobody answers as a USB device does.
+  /// Bus reset, address 1, device and configuration descriptors, serial number. False: nobody answers as a USB device
+  /// does.
   bool enumerate();
   void forget();  // all that is under way; the cable was pulled
 

@@ -17,7 +17,7 @@ using boards::host::Handshake;
 using boards::host::VirtualBoard;
 
 constexpr std::uint8_t bus_address = 1;
-constexpr double longest_lag_s = 1.0;       // of a program that stood still: then the board stood still as well
+constexpr double longest_lag_s = 1.0;  // of a program that stood still: then the board stood still as well
 // Bytes on their way, as a host controller's queues would hold them: who does not read lets the board wait.
 constexpr std::size_t out_bytes = 1 << 12, in_bytes = 1 << 16;
 
