@@ -21,6 +21,8 @@ constexpr std::size_t most_bins = 200000;
 
 double& at(Bin& bin, Drive d) { return bin.input[d]; }
 
+Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
+
 /// Missing cells replaced by the line between their neighbours.
 std::vector<double> bridged(std::vector<double> v, const std::vector<double>& t) {
   std::size_t last = v.size();
@@ -130,6 +132,30 @@ void add_readings(Bins& out, const Log& log, Role role, double Bin::*value, floa
   }
 }
 
+/// Bin::core_ahead, the mean over the bin's readings. Inputs hold from one sample to the next, and none was read before
+/// the log began.
+void add_ahead(Bins& out, const Log& log, const Inputs& in) {
+  if (!log.has(Role::core)) return;
+  const auto& t = log.of(Role::time);
+  const auto& read = log.of(Role::core);
+  const auto heat = [&](std::size_t i) {
+    return out.has_power ? in.power_W[i] : in.amplitude_A[i] * in.amplitude_A[i];
+  };
+  double integral = 0;  // since the bin began
+  std::size_t now = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const auto b = static_cast<std::size_t>(t[i] / out.width_s + 1e-9);
+    if (b >= out.bins.size()) break;
+    const double into_s = std::max(0.0, t[i] - out.width_s * static_cast<double>(b));
+    if (b != now) integral = i > 0 ? heat(i - 1) * into_s : 0;
+    now = b;
+    Bin& bin = out.bins[b];
+    if (!std::isnan(read[i]))
+      bin.core_ahead += (integral - at(bin, heater(out)) * into_s) / static_cast<double>(bin.core_n);
+    if (i + 1 < t.size()) integral += heat(i) * (t[i + 1] - t[i]);
+  }
+}
+
 }  // namespace
 
 Bins bins_of(const Log& log, double finest_s) {
@@ -148,7 +174,7 @@ Bins bins_of(const Log& log, double finest_s) {
                               fmt::format("{}: {} rows over {:.1f} s are too few to fit a motor; record some minutes.",
                                           log.name, t.size(), duration_s));
   }
-  out.width_s = std::max({usual_s, std::min(2.0, finest_s), duration_s / static_cast<double>(most_bins)});
+  out.width_s = std::max({usual_s, std::min(longest_bin_s, finest_s), duration_s / static_cast<double>(most_bins)});
   // A whole number of samples a bin, so that all bins hold equally many.
   out.width_s = usual_s * std::max(1.0, std::round(out.width_s / usual_s));
 
@@ -193,6 +219,7 @@ Bins bins_of(const Log& log, double finest_s) {
   }
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
+  add_ahead(out, log, in);
   out.has_housing = log.has(Role::housing);
   out.has_core = log.has(Role::core);
   out.housing_noise_K = reading_noise(log.of(Role::housing));
@@ -210,6 +237,51 @@ Bins bins_of(const Log& log, double finest_s) {
     // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
     bin.idle = heat <= 1e-3 * most_heat &&
                bin.input.drive[static_cast<int>(Drive::speed_rad_per_s)] <= 0.02 * most_speed + 1e-9;
+  }
+  return out;
+}
+
+Bins merged(const Bins& log, std::size_t together) {
+  Bins out = log;
+  out.width_s = log.width_s * static_cast<double>(together);
+  out.bins.clear();
+  for (std::size_t first = 0; first < log.bins.size(); first += together) {
+    const std::size_t count = std::min(together, log.bins.size() - first);
+    const double share = 1 / static_cast<double>(count);
+    Bin all{};
+    all.idle = true;
+    const auto add_reading = [&](const Bin& bin, std::size_t k, double Bin::*value, float Bin::*where,
+                                 float Bin::*number) {
+      if (bin.*number == 0) return;
+      all.*number += bin.*number;
+      const float part = bin.*number / all.*number;
+      all.*value += (bin.*value - all.*value) * static_cast<double>(bin.*number) / static_cast<double>(all.*number);
+      all.*where += ((static_cast<float>(k) + bin.*where) / static_cast<float>(together) - all.*where) * part;
+    };
+    for (std::size_t k = 0; k < count; ++k) {
+      const Bin& bin = log.bins[first + k];
+      for (int d = 0; d < thermal::drive_count; ++d) all.input.drive[d] += share * bin.input.drive[d];
+      for (int b = 0; b < thermal::boundary_count; ++b)
+        all.input.boundary_degC[b] += share * bin.input.boundary_degC[b];
+      all.signed_A += share * bin.signed_A;
+      all.stalled_A2 += share * bin.stalled_A2;
+      all.idle = all.idle && bin.idle;
+      add_reading(bin, k, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
+      add_reading(bin, k, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
+    }
+    double ahead = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Bin& bin = log.bins[first + k];
+      const double more = bin.input[heater(log)] - all.input[heater(log)];
+      if (bin.core_n > 0) {
+        const double at_reading = ahead + more * log.width_s * static_cast<double>(bin.core_at) + bin.core_ahead;
+        all.core_ahead += at_reading * static_cast<double>(bin.core_n) / static_cast<double>(all.core_n);
+      }
+      ahead += more * log.width_s;
+    }
+    if (all.housing_n == 0) all.housing_degC = missing;
+    if (all.core_n == 0) all.core_degC = missing;
+    out.bins.push_back(all);
   }
   return out;
 }

@@ -24,7 +24,10 @@ struct Bin {
   double housing_degC, core_degC;    // mean reading, NaN: none
   float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
   float housing_n, core_n;           // readings in it
-  bool idle;                         // nothing heats and nothing turns
+  /// How far the integral of what heats the winding (i^2 in A2 s; W s where power was recorded) had run ahead of the
+  /// bin's mean when the winding was read: a step of load inside a bin is seen by its moment.
+  double core_ahead;
+  bool idle;  // nothing heats and nothing turns
 };
 
 struct Bins {
@@ -40,7 +43,12 @@ struct Bins {
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 
+inline constexpr double longest_bin_s = 2;
+
 /// `finest_s`: bins no longer than this where the sampling allows it (half the winding's time constant).
 Bins bins_of(const Log& log, double finest_s);
+
+/// Every `together` bins as one.
+Bins merged(const Bins& log, std::size_t together);
 
 }  // namespace identify

@@ -15,13 +15,13 @@ enum class Edit {
   source,          // heat into a node, parameter 0 W per unit of the drive
   coefficient,     // parameter 0: temperature coefficient of the copper loss
   sink_law,        // parameter 0: k of the law of the link housing-sink
-  contact_law,     // parameter 0: k of the link core-housing
   radiation,       // parameter 0: conductance of a radiating link housing-sink, W/K at 300 K
   link,            // parameter 0: conductance housing-boundary
   mass,            // parameters: capacity and resistance of a further node on the housing
   hot_spot,        // the same on the winding, taking a share of its loss
   cooling_step,    // parameters: factor of the sink conductance, and when
   cooling_of_log,  // parameter 0: factor of the sink conductance throughout one of several logs
+  power_of_log,    // parameter 0: factor of the recorded power that heats, likewise
   current_offset,
   sensor_lag,
   sensor_offset,
@@ -56,7 +56,7 @@ struct Parameter {
   double none = 0;  // the value at which the cause does nothing
 };
 
-enum class Needs { nothing, current, speed, neighbour, frame, signed_current, several_logs, copper };
+enum class Needs { nothing, current, speed, neighbour, frame, signed_current, several_logs, several_powers, copper };
 
 struct Cause {
   const char* id;
@@ -78,7 +78,12 @@ const std::vector<Cause>& causes();
 /// Index in causes(), -1: none of that id.
 int cause_named(const std::string& id);
 
-/// A cause chosen for a fit; `log` only for cooling_of_log, -1 otherwise.
+/// The cause is of one log among several, and may be chosen for each of them.
+inline bool of_one_log(const Cause& cause) {
+  return cause.edit == Edit::cooling_of_log || cause.edit == Edit::power_of_log;
+}
+
+/// A cause chosen for a fit; `log` only for causes of one log, -1 otherwise.
 struct Chosen {
   int cause = -1;
   int log = -1;
@@ -112,10 +117,6 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       set.links[model.sink_link].law = cause.law;
       set.links[model.sink_link].k = k[0];
       break;
-    case Edit::contact_law:
-      set.links[0].law = cause.law;
-      set.links[0].k = k[0];
-      break;
     case Edit::radiation:
       add_link(model.housing, ambient, thermal::LinkLaw::radiation, k[0]);
       break;
@@ -148,6 +149,11 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
     case Edit::cooling_of_log:
       if (chosen.log == log)
         set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
+      break;
+    case Edit::power_of_log:
+      for (int s = 0; chosen.log == log && s < set.source_count; ++s) {
+        if (set.sources[s].drive == thermal::Drive::power_W) set.sources[s].gain = set.sources[s].gain * k[0];
+      }
       break;
     case Edit::current_offset:
       model.current_offset_A = k[0];

@@ -77,14 +77,19 @@ std::string sentence(const Search& found, const Report& r) {
       return fmt::format("The motor behaves like {}: {}, with it {}.", listed(found.tied.front(), " and "), miss,
                          after());
     case Verdict::partly_explained:
-      return fmt::format("The motor behaves mostly like {}: {}, with it {}; something smaller remains.",
-                         listed(found.tied.front(), " and "), miss, after());
+      return fmt::format("The motor behaves mostly like {}: {}, with it {}; a slow disturbance of {:.2f} K remains.",
+                         listed(found.tied.front(), " and "), miss, after(), found.remains_K);
     case Verdict::ambiguous: {
       std::string sets;
       for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i)
         sets += (i > 0 ? ", or " : "") + listed(found.tied[i], " and ");
-      return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}{}.", miss, sets,
-                         found.tied.size() > 4 ? fmt::format(", or {} more", found.tied.size() - 4) : "");
+      std::vector<std::string> shared = found.tied.front();
+      for (const auto& ids : found.tied)
+        std::erase_if(shared, [&](const auto& id) { return std::find(ids.begin(), ids.end(), id) == ids.end(); });
+      if (found.tied.size() > 4) sets += fmt::format(", or {} more", found.tied.size() - 4);
+      if (!shared.empty()) sets += "; all of them with " + listed(shared, " and ");
+      if (found.remains_K > 0) sets += fmt::format("; a slow disturbance of {:.2f} K remains", found.remains_K);
+      return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}.", miss, sets);
     }
     case Verdict::unknown_cause:
       return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
@@ -249,14 +254,13 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
         if (c.tied) open.push_back(&c.fit);
       }
       written = &most_cautious(problem, open);
-      const std::string ids = listed(ids_of(written->chosen), " and ");
       report.reasoning.push_back(
           fmt::format("The model written for the board is the one that bears a push the shortest: {}.",
-                      ids.empty() ? "the two-resistor model" : ids));
+                      listed(ids_of(written->chosen), " and ")));
     }
     if (extended) {
       add_extended(problem, found.chosen.fit, report, 0);
-      if (report.core_refusal.empty() && written != &two) report.gain = gain_of(problem, two, *written);
+      if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *written);
     }
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);

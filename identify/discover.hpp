@@ -7,7 +7,6 @@
 
 namespace identify {
 
-
 /// The parameters of the which-th chosen cause, in its units.
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& fit, std::size_t which);
 

@@ -8,45 +8,51 @@
 
 namespace identify {
 
+/// Two derivatives at a time, as every PC's registers hold them: left to itself the compiler pairs only some.
+using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
+
 template <int N>
 struct Dual {
+  static_assert(N % 2 == 0);
+  static constexpr int pairs = N / 2;
   double v;
-  double d[N];
+  Pair d[pairs];
 
   Dual() = default;
   constexpr Dual(double value) : v(value), d{} {}  // implicit: a constant has no derivative
   static Dual variable(double value, int direction) {
     Dual x(value);
-    if (direction >= 0) x.d[direction] = 1;
+    if (direction >= 0) x.d[direction / 2][direction % 2] = 1;
     return x;
   }
+  double slope(int direction) const { return d[direction / 2][direction % 2]; }
 
   Dual& operator+=(const Dual& b) {
     v += b.v;
-    for (int i = 0; i < N; ++i) d[i] += b.d[i];
+    for (int i = 0; i < pairs; ++i) d[i] += b.d[i];
     return *this;
   }
   Dual& operator-=(const Dual& b) {
     v -= b.v;
-    for (int i = 0; i < N; ++i) d[i] -= b.d[i];
+    for (int i = 0; i < pairs; ++i) d[i] -= b.d[i];
     return *this;
   }
   Dual& operator+=(double b) { return v += b, *this; }
   Dual& operator-=(double b) { return v -= b, *this; }
   Dual& operator*=(double b) {
     v *= b;
-    for (int i = 0; i < N; ++i) d[i] *= b;
+    for (int i = 0; i < pairs; ++i) d[i] *= b;
     return *this;
   }
   Dual& operator*=(const Dual& b) {
-    for (int i = 0; i < N; ++i) d[i] = d[i] * b.v + v * b.d[i];
+    for (int i = 0; i < pairs; ++i) d[i] = d[i] * b.v + v * b.d[i];
     v *= b.v;
     return *this;
   }
   Dual& operator/=(const Dual& b) {
     const double inverse = 1 / b.v;
     v *= inverse;
-    for (int i = 0; i < N; ++i) d[i] = (d[i] - v * b.d[i]) * inverse;
+    for (int i = 0; i < pairs; ++i) d[i] = (d[i] - v * b.d[i]) * inverse;
     return *this;
   }
 
@@ -64,7 +70,7 @@ struct Dual {
   friend Dual operator/(double a, const Dual& b) { return Dual(a) /= b; }
   friend Dual operator-(Dual a) {
     a.v = -a.v;
-    for (int i = 0; i < N; ++i) a.d[i] = -a.d[i];
+    for (int i = 0; i < pairs; ++i) a.d[i] = -a.d[i];
     return a;
   }
   friend bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
@@ -77,7 +83,7 @@ struct Dual {
   static Dual chain(const Dual& a, double value, double slope) {
     Dual r;
     r.v = value;
-    for (int i = 0; i < N; ++i) r.d[i] = slope * a.d[i];
+    for (int i = 0; i < pairs; ++i) r.d[i] = slope * a.d[i];
     return r;
   }
   friend Dual exp(const Dual& a) {
@@ -101,7 +107,7 @@ struct Dual {
     const double p = std::pow(a.v, k.v), by_a = p * k.v / a.v, by_k = p * std::log(a.v);
     Dual r;
     r.v = p;
-    for (int i = 0; i < N; ++i) r.d[i] = by_a * a.d[i] + by_k * k.d[i];
+    for (int i = 0; i < pairs; ++i) r.d[i] = by_a * a.d[i] + by_k * k.d[i];
     return r;
   }
   friend bool isfinite(const Dual& a) { return std::isfinite(a.v); }

@@ -155,6 +155,7 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     bool cool = true;
     for (const Candidate* truth : tied) {
       Problem trial = problem;
+      trial.noise = found.noise;
       // The motor's own limit, with 10 K to spare, under every one of the models: identification must not burn what it
       // measures.
       cool = false;

@@ -32,7 +32,7 @@ struct Fit {
 
   int cause_coordinates() const;
   Eigen::VectorXd std_errors() const;  // of coordinates, from the data and the prior, bounds held
-  double surprise() const;  // -2 ln of the model's evidence, up to what all models of the problem share
+  double surprise() const;             // -2 ln of the model's evidence, up to what all models of the problem share
 };
 
 /// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause
@@ -43,8 +43,9 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
         int most = 60);
 
 /// What no motor is without: a housing that is not one mass and a sensor that is not quite on it, so that its reading
-/// comes early or late by seconds. Causes are to be ranked by more than that. `two_resistors`: the baseline's fit.
-std::vector<Imperfections> ordinary_imperfections(const Problem& problem, const Fit& two_resistors);
+/// comes early or late by seconds. How far a lateness of ordinary size puts it off, K, for each log and bin; causes
+/// are to be ranked by more than that. `two_resistors`: the baseline's fit.
+std::vector<std::vector<double>> ordinary_lateness_K(const Problem& problem, const Fit& two_resistors);
 
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.

@@ -100,7 +100,10 @@ HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::Motor
   const auto logs = other.logs;
   other = whole;
   other.logs = logs;
-  const Fit before = transferred(other, base), after = transferred(other, extended);
+  // What is of one of the fitted logs (a fan) is not of these.
+  Fit elsewhere = extended;
+  for (Chosen& c : elsewhere.chosen) c.log = -1;
+  const Fit before = transferred(other, base), after = transferred(other, elsewhere);
   out.before = rmse_of(other, before, &out.each_before);
   out.after = rmse_of(other, after);
   for (const Log& log : held.logs) out.names.push_back(log.name);

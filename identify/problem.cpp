@@ -209,6 +209,8 @@ bool Problem::possible(const Cause& cause) const {
       return any([](const Bins& b) { return b.has_frame; });
     case Needs::several_logs:
       return logs.size() > 1;
+    case Needs::several_powers:
+      return logs.size() > 1 && heated_by_power();
   }
   return true;
 }
@@ -232,6 +234,13 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     finest_s = m.R1_K_per_W * m.C1_J_per_K / 2;
   }
   if (copper_per_K) problem.belief.copper_per_K = *copper_per_K;
+  // A winding read all the time shows how its temperature bends within a bin.
+  const bool dense = std::any_of(logs.begin(), logs.end(), [](const Log& log) {
+    const auto& core = log.of(Role::core);
+    return std::count_if(core.begin(), core.end(), [](double x) { return !std::isnan(x); }) >
+           static_cast<std::ptrdiff_t>(core.size() / 2);
+  });
+  if (dense) finest_s = std::min(finest_s, longest_bin_s) / 2;
   for (const Log& log : logs) problem.logs.push_back(bins_of(log, finest_s));
   if (problem.heated_by_power()) problem.belief.copper_per_K = 0;
   noise_from_rest(problem);

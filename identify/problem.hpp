@@ -3,7 +3,6 @@
 // are.
 #pragma once
 
-#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,23 +29,18 @@ struct Belief {
 /// model is known to be off for reasons without a name, a disturbance comes on top: another one, slower.
 struct Noise {
   double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
-  double core_white_K = 1, core_slow_K = 0;  // slow 0: read so rarely that all is white
+  double core_white_K = 1, core_slow_K = 0;      // slow 0: read so rarely that all is white
   double disturbance_K = 0, disturbance_s = 60;  // of the housing; a winding that wanders more is disturbed more
-  double idle_s = 0;  // how much rest it was taken from; 0: assumed
-};
-
-/// What imperfections of ordinary size do to the readings of one log: a row each, a column for each bin.
-struct Imperfections {
-  Eigen::MatrixXd housing_K, core_K;
+  double idle_s = 0;                             // how much rest it was taken from; 0: assumed
 };
 
 struct Problem {
   std::vector<Bins> logs;
   Belief belief;
   Noise noise;
-  /// For each log, what any motor may have of its own beside the model: a fit averages over them (prior standard
-  /// deviation 1, in units of the ordinary size). Empty: the model is exact.
-  std::vector<Imperfections> ordinary;
+  /// For each log and bin, how far an ordinary lateness puts the housing's reading off: a fit averages over late and
+  /// early (prior standard deviation 1 in that unit). Empty: readings are on time.
+  std::vector<std::vector<double>> lateness_K;
   double heat_W = 1;  // mean copper heat, and means of the drives: the scales of cause.hpp
   double drive_mean[thermal::drive_count] = {};
   double rms_A = 1, speed08_mean = 1, duration_s = 1;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/report.hpp"
+#include "identify/search.hpp"
 #include "wire/pc/plot.hpp"
 
 namespace identify {
@@ -118,10 +119,10 @@ std::string parameter_rows(const std::vector<ParameterLine>& lines) {
 std::string bars(const Report& r) {
   double most = 10;
   for (const Rung& rung : r.ladder) most = std::max(most, rung.delta_bic);
-  std::string s =
-      "<h2>Candidates</h2><p>Evidence gained over the two-resistor model; 10 are asked for before anything is named, "
-      "and a lead of 6 before one "
-      "is named alone.</p><table class=ladder>\n";
+  std::string s = fmt::format(
+      "<h2>Candidates</h2><p>Evidence gained over the two-resistor model; {:g} are asked for before anything is named, "
+      "and a lead of {:g} before one is named alone.</p><table class=ladder>\n",
+      Margins{}.detect, Margins{}.tie);
   for (const Rung& rung : r.ladder) {
     // Evidence spans decades: the bar is its square root.
     const double width = 100 * std::sqrt(std::max(0.0, rung.delta_bic) / most);

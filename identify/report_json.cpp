@@ -79,6 +79,7 @@ std::string as_json(const Report& r) {
                              {"rivals", rivals}});
   }
   out["tied"] = r.tied;
+  out["rmse_with_causes_K"] = r.causes.empty() ? ordered_json(nullptr) : rms(r.extended_rmse);
   out["candidates"] = ordered_json::array();
   for (const Rung& rung : r.ladder) {
     out["candidates"].push_back(

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "identify/report.hpp"
+#include "identify/search.hpp"
 
 namespace identify {
 namespace {
@@ -98,7 +99,8 @@ std::string as_text(const Report& r, bool explain) {
   s += "\n";
 
   if (!r.ladder.empty()) {
-    s += "\nCandidates (evidence gained over the two-resistor model; 10 are asked for)\n";
+    s += fmt::format("\nCandidates (evidence gained over the two-resistor model; {:g} are asked for)\n",
+                     Margins{}.detect);
     for (const Rung& rung : r.ladder) {
       s += fmt::format("  {} {:<22} {:>9.1f}  {}\n",
                        rung.chosen ? "=>"

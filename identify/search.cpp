@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/baseline.hpp"
+#include "identify/parallel.hpp"
 
 namespace identify {
 namespace {
@@ -19,7 +20,8 @@ namespace {
 constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
-constexpr double least_slow_K = 0.02;  // below it a thermistor's slow noise hides behind its steps
+constexpr std::size_t least_look_bins = 6000;  // of twice as many, looks see every two as one
+constexpr double least_slow_K = 0.02;          // below it a thermistor's slow noise hides behind its steps
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
 double ratio_of(const Fit& f) { return std::sqrt(2 * f.misfit / std::max(1, f.readings)); }
@@ -44,7 +46,7 @@ bool compatible(const std::vector<Chosen>& have, const Chosen& more) {
   int nodes = b.edit == Edit::mass || b.edit == Edit::hot_spot;
   for (const Chosen& c : have) {
     const Cause& a = causes()[static_cast<std::size_t>(c.cause)];
-    if (c.cause == more.cause && (b.edit != Edit::cooling_of_log || c.log == more.log)) return false;
+    if (c.cause == more.cause && (!of_one_log(b) || c.log == more.log)) return false;
     if (a.edit == Edit::sink_law && b.edit == Edit::sink_law) return false;
     nodes += a.edit == Edit::mass || a.edit == Edit::hot_spot;
   }
@@ -56,7 +58,7 @@ std::vector<Chosen> available(const Problem& problem, const std::vector<std::str
   for (std::size_t c = 0; c < causes().size(); ++c) {
     const Cause& cause = causes()[c];
     if (!problem.possible(cause) || std::find(without.begin(), without.end(), cause.id) != without.end()) continue;
-    if (cause.edit != Edit::cooling_of_log) {
+    if (!of_one_log(cause)) {
       out.push_back({static_cast<int>(c), -1});
       continue;
     }
@@ -117,21 +119,31 @@ struct Disturbance {
 Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   const auto evidence = [](const Problem& p, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(p); };
   const double own = evidence(problem, undisturbed);
-  Disturbance out{problem.noise, 0, own};
   // One to four minutes: slower ones are the model's own time constants, faster ones the sensor's wander. Half as large
   // again each time: coarser than that loses a gain of three.
-  for (const double slow_s : {60.0, 240.0}) {
+  constexpr double slow_s[] = {60, 240}, past_top = 20;
+  std::vector<Disturbance> tried[std::size(slow_s)];
+  in_parallel(std::size(slow_s), [&](std::size_t i) {
     Problem disturbed = problem;
-    disturbed.noise.disturbance_s = slow_s;
+    disturbed.noise.disturbance_s = slow_s[i];
     Fit warm = undisturbed;
+    double most = own;
     for (double factor = 0.6; factor < 1000; factor *= 1.6) {
       disturbed.noise.disturbance_K = factor * problem.noise.housing_slow_K;
       Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
       if (f.x.size() == 0) break;
       const double reached = evidence(disturbed, f);
-      if (reached > out.evidence) out = {disturbed.noise, reached - own, reached};
-      if (reached < out.evidence - 20) break;  // past the top
+      tried[i].push_back({disturbed.noise, reached - own, reached});
+      most = std::max(most, reached);
+      if (reached < most - past_top) break;
       warm = std::move(f);
+    }
+  });
+  Disturbance out{problem.noise, 0, own};
+  for (const std::vector<Disturbance>& larger : tried) {
+    for (const Disturbance& d : larger) {
+      if (d.evidence > out.evidence) out = d;
+      if (d.evidence < out.evidence - past_top) break;  // a slower one must be near the faster at once
     }
   }
   return out;
@@ -156,43 +168,101 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
 /// Every cause alone, best first.
 std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
                                   const std::vector<Candidate>& before) {
+  std::vector<Fit> fits(all.size());
+  in_parallel(all.size(), [&](std::size_t i) {
+    const std::vector<Chosen> alone = {all[i]};
+    const auto known =
+        std::find_if(before.begin(), before.end(), [&](const Candidate& b) { return b.fit.chosen == alone; });
+    fits[i] = fit(problem, alone, {known == before.end() ? &base.fit : &known->fit});
+  });
   std::vector<Candidate> out;
-  for (const Chosen& c : all) {
-    const auto known = std::find_if(before.begin(), before.end(),
-                                    [&](const Candidate& b) { return b.fit.chosen == std::vector<Chosen>{c}; });
-    Fit f = known == before.end() ? fit(problem, {c}, {&base.fit}) : fit(problem, {c}, {&known->fit});
+  for (Fit& f : fits) {
     if (f.x.size() > 0) out.push_back(candidate(base, std::move(f)));
   }
   sort(out);
   return out;
 }
 
-/// The pairs that may come near the best one, fitted to the end, best first.
-std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, const std::vector<Candidate>& singles) {
-  const auto hoped = [](const Fit& f) { return f.surprise() - 2 * f.promise; };
-  std::vector<Fit> looks;
-  for (std::size_t a = 0; a < singles.size(); ++a) {
-    const Fit& better = singles[a].fit;
-    for (std::size_t b = a + 1; b < singles.size(); ++b) {
-      if (!compatible(better.chosen, singles[b].fit.chosen.front())) continue;
-      const std::vector<Chosen> set = {better.chosen.front(), singles[b].fit.chosen.front()};
-      Fit f = fit(problem, set, {&better, &singles[b].fit}, look_steps);
-      if (a < beam) {
-        Fit anew = fit(problem, set, {&better}, look_steps);
-        if (anew.x.size() > 0 && (f.x.size() == 0 || hoped(anew) < hoped(f))) f = std::move(anew);
-      }
-      if (f.x.size() > 0) looks.push_back(std::move(f));
+/// For looks at a long log: fewer, longer bins. What `best` simulates differs in them, of a winding above all, whose
+/// time constant may be shorter; the readings are moved by that, so that it leaves what it left before.
+Problem coarse(const Problem& problem, const Fit& best) {
+  std::size_t bins = 0;
+  for (const Bins& log : problem.logs) bins += log.bins.size();
+  const std::size_t together = bins / least_look_bins;
+  Problem out = problem;
+  if (together < 2) return out;
+  for (std::size_t l = 0; l < out.logs.size(); ++l) {
+    Bins& log = out.logs[l];
+    Bins simulated = log, late = log;
+    const Replayed fine = replayed(problem, best, static_cast<int>(l));
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      simulated.bins[k].housing_degC = fine.housing_degC[k];
+      simulated.bins[k].core_degC = fine.core_degC[k];
+      late.bins[k].housing_degC = problem.lateness_K[l][k];
+    }
+    log = merged(log, together);
+    simulated = merged(simulated, together);
+    late = merged(late, together);
+    out.lateness_K[l].clear();
+    for (const Bin& bin : late.bins) out.lateness_K[l].push_back(bin.housing_degC);
+    const Replayed rough = replayed(out, best, static_cast<int>(l));
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      log.bins[k].housing_degC += rough.housing_degC[k] - simulated.bins[k].housing_degC;
+      log.bins[k].core_degC += rough.core_degC[k] - simulated.bins[k].core_degC;
     }
   }
+  return out;
+}
+
+/// The pairs that may come near the best one, fitted to the end, best first.
+std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, const std::vector<Candidate>& singles) {
+  if (singles.empty()) return {};
+  struct Pair {
+    std::vector<Chosen> set;
+    const Fit *better, *other;
+    bool anew;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t a = 0; a < singles.size(); ++a) {
+    for (std::size_t b = a + 1; b < singles.size(); ++b) {
+      const Fit &better = singles[a].fit, &other = singles[b].fit;
+      if (compatible(better.chosen, other.chosen.front()))
+        pairs.push_back({{better.chosen.front(), other.chosen.front()}, &better, &other, a < beam});
+    }
+  }
+  const auto hoped = [](const Fit& f) { return f.surprise() - 2 * f.promise; };
+  const Fit& leader = singles.front().fit;
+  const Problem rough = coarse(problem, leader);
+  std::vector<Fit> looks(pairs.size());
+  in_parallel(pairs.size(), [&](std::size_t i) {
+    const Pair& pair = pairs[i];
+    looks[i] = fit(rough, pair.set, {pair.better, pair.other}, look_steps);
+    if (!pair.anew) return;
+    Fit anew = fit(rough, pair.set, {pair.better}, look_steps);
+    if (anew.x.size() > 0 && (looks[i].x.size() == 0 || hoped(anew) < hoped(looks[i]))) looks[i] = std::move(anew);
+  });
+  std::erase_if(looks, [](const Fit& f) { return f.x.size() == 0; });
   std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
-  std::vector<Candidate> out;
+
+  // What all bins surprise more than the rough ones.
+  const double more = leader.surprise() - fit(rough, leader.chosen, {&leader}, 0).surprise();
   double best = 1e300;
-  for (std::size_t i = 0; i < std::min(most_finished, looks.size()); ++i) {
+  const auto worth_it = [&](std::size_t i) {
     const double errs = std::max(look_errs, look_errs_share * (base.fit.surprise() - best));
-    if (i > 0 && hoped(looks[i]) > best + errs) break;
-    Fit f = fit(problem, looks[i].chosen, {&looks[i]});
-    best = std::min(best, f.surprise());
-    out.push_back(candidate(base, std::move(f)));
+    return i < std::min(most_finished, looks.size()) && (i == 0 || hoped(looks[i]) + more <= best + errs);
+  };
+  std::vector<Candidate> out;
+  while (worth_it(out.size())) {
+    const std::size_t done = out.size();
+    std::vector<Fit> next(std::min<std::size_t>(most_threads, looks.size() - done));
+    in_parallel(next.size(), [&](std::size_t i) {
+      const Fit& look = looks[done + i];
+      next[i] = fit(problem, look.chosen, {&look});
+    });
+    for (std::size_t i = 0; i < next.size() && worth_it(done + i); ++i) {  // as one thread would
+      best = std::min(best, next[i].surprise());
+      out.push_back(candidate(base, std::move(next[i])));
+    }
   }
   sort(out);
   return out;
@@ -210,19 +280,36 @@ void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& fi
   base.ratio = ratio_of(base.fit);
   field.base = std::move(base);
   field.singles = singles_of(problem, all, field.base, field.singles);
+  // A cause may only have helped the four out of a poor valley: they start again from where the best ended.
+  if (field.singles.empty()) return;
+  Fit again = fit(problem, {}, {&field.singles.front().fit});
+  if (again.x.size() == 0 || again.cost >= field.base.fit.cost) return;
+  field.base.fit = std::move(again);
+  field.base.ratio = ratio_of(field.base.fit);
+  for (Candidate& c : field.singles) c = candidate(field.base, std::move(c.fit));
 }
 
 void fit_pairs(const Problem& problem, Field& field) {
   field.pairs = pairs_of(problem, field.base, field.singles);
   // A second cause may only have helped the first out of a poor valley: each alone starts again from where the pair
   // ended, and the pair must beat that.
+  struct Again {
+    Candidate* alone;
+    const Fit* both;
+    Fit fit;
+  };
+  std::vector<Again> all;
   for (std::size_t i = 0; i < std::min(beam, field.pairs.size()); ++i) {
+    const Fit& both = field.pairs[i].fit;
     for (Candidate& alone : field.singles) {
-      const auto& both = field.pairs[i].fit.chosen;
-      if (std::find(both.begin(), both.end(), alone.fit.chosen.front()) == both.end()) continue;
-      Fit again = fit(problem, alone.fit.chosen, {&field.pairs[i].fit});
-      if (again.x.size() > 0 && again.cost < alone.fit.cost) alone = candidate(field.base, std::move(again));
+      if (std::find(both.chosen.begin(), both.chosen.end(), alone.fit.chosen.front()) != both.chosen.end())
+        all.push_back({&alone, &both, {}});
     }
+  }
+  in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
+  for (Again& again : all) {
+    if (again.fit.x.size() > 0 && again.fit.cost < again.alone->fit.cost)
+      *again.alone = candidate(field.base, std::move(again.fit));
   }
   sort(field.singles);
 }
@@ -255,6 +342,24 @@ std::string why_no_pair(const Problem& problem, const Field& field, const Margin
         "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
         more_K, first, fewer_K);
   return "";
+}
+
+/// The best pair with either of its causes replaced by each other one: what a short look passed over may be as good.
+void add_neighbours(const Problem& problem, const Field& field, std::vector<Candidate>& sets) {
+  const Candidate best = sets.front();
+  for (const Chosen& kept : best.fit.chosen) {
+    for (const Candidate& other : field.singles) {
+      const Chosen more = other.fit.chosen.front();
+      const std::vector<Chosen> pair = {kept, more};
+      const auto same = [&](const Candidate& c) {
+        return std::is_permutation(pair.begin(), pair.end(), c.fit.chosen.begin(), c.fit.chosen.end());
+      };
+      if (!compatible({kept}, more) || std::any_of(sets.begin(), sets.end(), same)) continue;
+      Fit f = fit(problem, pair, {&best.fit, &other.fit});
+      if (f.x.size() > 0) sets.push_back(candidate(field.base, std::move(f)));
+    }
+  }
+  sort(sets);
 }
 
 }  // namespace
@@ -290,10 +395,10 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Field field;
   const auto all = available(problem, without);
   const auto say = [&](std::string step) { out.steps.push_back(std::move(step)); };
-  problem.ordinary = ordinary_imperfections(problem, fit(problem, {}));
+  problem.lateness_K = ordinary_lateness_K(problem, fit(problem, {}));
   // A board runs the model alone: what is handed on was fitted without leeway, to the noise that was judged by.
   const auto hand_on = [&](Problem exact) {
-    exact.ordinary.clear();
+    exact.lateness_K.clear();
     const auto refit = [&](Fit& f) { f = fit(exact, f.chosen, {&f}); };
     refit(out.base.fit);
     refit(out.chosen.fit);
@@ -310,6 +415,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     fit_alone(problem, all, field);
   }
   out.base = out.chosen = field.base;
+  out.noise = problem.noise;
   out.singles = field.singles;
   say(fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
 
@@ -359,6 +465,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
                     field.pairs.front().gain, field.pairs.front().gain - field.singles.front().gain,
                     listed(field.singles.front().fit.chosen)));
     out.sets = std::move(field.pairs);
+    if (judged.noise.disturbance_K > 0) add_neighbours(judged, field, out.sets);
   } else {
     say(refusal);
     out.sets = std::move(field.singles);
@@ -376,17 +483,24 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const double before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
   const double after_K = left.noise.disturbance_K;
   const bool mostly = (single && explains > margins.dominance * left.gain) || after_K < margins.small_part * before_K;
+  // What is left may be the sensors' own where no rest at all has shown how they wander.
+  const bool nearly = problem.noise.idle_s == 0 && after_K < margins.small_part_unseen * before_K;
   const std::string remains = fmt::format(
       "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
       "gains {:.1f}",
       before_K, after_K, left.gain, explains);
-  // Which sets are as good? What is left over may belong to any of them.
-  const double tie = complete ? margins.tie : margins.tie + left.gain;
+  // Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
+  // from the best by no more than what is left.
+  const double reach = complete ? margins.tie : margins.tie + left.gain;
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
-    if (c.chosen || out.chosen.gain - c.gain >= tie) continue;
+    const double behind = out.chosen.gain - c.gain;
+    if (c.chosen || behind >= reach) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
+    if (behind >= margins.tie && out.tied.size() > 1 &&
+        moved_K(problem, out.chosen.fit, c.fit) > margins.left_apart * after_K)
+      continue;
     c.tied = true;
     out.tied.push_back(ids);
   }
@@ -395,16 +509,17 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     ladder += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
   say("The best sets and their evidence: " + ladder + ".");
 
-  if (explains < margins.detect || (!complete && !mostly)) {
+  const bool tie = out.tied.size() > 1;
+  if (explains < margins.detect || (!complete && !mostly && !(nearly && tie))) {
     out.verdict = Verdict::unknown_cause;
     say(fmt::format("The best is {}, but {}: none of the known causes explains this.", best, remains));
-  } else if (out.tied.size() > 1) {
-    out.verdict = Verdict::ambiguous;
-    say(fmt::format("{} other sets of causes come within {:.0f}: they cannot be told apart with this data; {}.",
-                    out.tied.size() - 1, tie, remains));
   } else {
-    out.verdict = complete ? Verdict::explained : Verdict::partly_explained;
-    say(fmt::format("No other set comes within {:.0f}; {}.", margins.tie, remains));
+    out.verdict = tie ? Verdict::ambiguous : complete ? Verdict::explained : Verdict::partly_explained;
+    out.remains_K = complete ? 0 : after_K;
+    say(tie ? fmt::format("Others come within {:.0f}, {} of them near: they cannot be told apart with this data; {}.",
+                          reach, out.tied.size() - 1, remains)
+            : fmt::format("No other set comes within {:.0f}; {}.", reach, remains));
+    if (!complete && !mostly) say("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }
   hand_on(judged);
   return out;

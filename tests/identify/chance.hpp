@@ -21,11 +21,12 @@ inline std::uint64_t rotating_seed() {
 
 /// Chance of at most `hits` of `trials` when each succeeds with `share`.
 inline double chance_of_at_most(int hits, int trials, double share) {
-  double sum = 0, term = std::pow(1 - share, trials);
   if (share >= 1) return hits >= trials ? 1 : 0;
+  if (share <= 0) return 1;
+  double sum = 0;
   for (int k = 0; k <= hits && k <= trials; ++k) {
-    sum += term;
-    term *= static_cast<double>(trials - k) / (k + 1) * share / (1 - share);
+    const double ways = std::lgamma(trials + 1) - std::lgamma(k + 1) - std::lgamma(trials - k + 1);
+    sum += std::exp(ways + k * std::log(share) + (trials - k) * std::log(1 - share));
   }
   return sum;
 }

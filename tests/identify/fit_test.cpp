@@ -41,8 +41,8 @@ TEST(Dual, DerivativesAreExact) {
   const double h = 1e-6;
   const auto f = [](double a, double b) { return std::exp(a * b) / (a + 2) - std::pow(a, b) * std::log(a); };
   EXPECT_NEAR(y.v, f(1.3, 0.7), 1e-14);
-  EXPECT_NEAR(y.d[0], (f(1.3 + h, 0.7) - f(1.3 - h, 0.7)) / (2 * h), 1e-8);
-  EXPECT_NEAR(y.d[1], (f(1.3, 0.7 + h) - f(1.3, 0.7 - h)) / (2 * h), 1e-8);
+  EXPECT_NEAR(y.slope(0), (f(1.3 + h, 0.7) - f(1.3 - h, 0.7)) / (2 * h), 1e-8);
+  EXPECT_NEAR(y.slope(1), (f(1.3, 0.7 + h) - f(1.3, 0.7 - h)) / (2 * h), 1e-8);
 }
 
 TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
@@ -188,7 +188,7 @@ TEST(Fit, LeewayAveragesOverALagOfSecondsAndNotOverOneOfHalfAMinute) {
       return 2 * (two.cost - identify::fit(late, {{identify::cause_named("sensor_lag"), -1}}, {&two}).cost);
     };
     const double exact = of();
-    late.ordinary = identify::ordinary_imperfections(late, identify::fit(late, {}));
+    late.lateness_K = identify::ordinary_lateness_K(late, identify::fit(late, {}));
     return std::pair(exact, of());
   };
   const auto [seconds, seconds_with] = gain(2);
@@ -239,6 +239,120 @@ TEST(Refusal, ACoreReadingOrCoppersCoefficientLiftsIt) {
   tests::BenchOptions options = off_sheet(4);
   const Problem with_core = problem_from(options);
   EXPECT_TRUE(identify::core_refusal(with_core, identify::fit(with_core, {})).empty());
+}
+
+TEST(Bins, MergedTheyKeepTimeMeansAndReadings) {
+  identify::Bins log;
+  log.width_s = 0.5;
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> uniform(1, 9);
+  for (int k = 0; k < 60; ++k) {
+    identify::Bin bin{};
+    for (double& d : bin.input.drive) d = uniform(random);
+    for (double& b : bin.input.boundary_degC) b = uniform(random);
+    bin.signed_A = uniform(random) - 5;
+    bin.stalled_A2 = uniform(random);
+    bin.housing_n = static_cast<float>(random() % 4), bin.core_n = k % 7 == 0 ? 1 : 0;
+    bin.housing_degC = uniform(random), bin.core_degC = uniform(random);
+    bin.housing_at = 0.1f * static_cast<float>(random() % 10), bin.core_at = 0.25f;
+    bin.idle = k < 12;
+    log.bins.push_back(bin);
+  }
+  struct Totals {
+    double drives = 0, boundaries = 0, amps = 0, readings = 0, idle_s = 0;
+    double housing = 0, core = 0, housing_s = 0, core_s = 0;
+    explicit Totals(const identify::Bins& bins) {
+      for (std::size_t k = 0; k < bins.bins.size(); ++k) {
+        const identify::Bin& b = bins.bins[k];
+        const double h = bins.width_s, n = static_cast<double>(b.housing_n), m = static_cast<double>(b.core_n);
+        const auto place_s = [&](float at) { return h * (static_cast<double>(k) + static_cast<double>(at)); };
+        for (std::size_t d = 0; d < std::size(b.input.drive); ++d)
+          drives += h * static_cast<double>(d + 1) * b.input.drive[d];
+        for (std::size_t d = 0; d < std::size(b.input.boundary_degC); ++d)
+          boundaries += h * static_cast<double>(d + 1) * b.input.boundary_degC[d];
+        amps += h * (b.signed_A + 3 * b.stalled_A2);
+        readings += n + 100 * m;
+        if (n > 0) housing += n * b.housing_degC, housing_s += n * place_s(b.housing_at);
+        if (m > 0) core += m * b.core_degC, core_s += m * place_s(b.core_at);
+        idle_s += b.idle ? h : 0;
+      }
+    }
+  };
+  const Totals fine(log);
+  for (const std::size_t together : {2u, 3u, 6u}) {
+    const identify::Bins few = identify::merged(log, together);
+    ASSERT_EQ(few.bins.size(), log.bins.size() / together);
+    EXPECT_NEAR(few.duration_s(), log.duration_s(), 1e-9);
+    const Totals coarse(few);
+    EXPECT_NEAR(coarse.drives, fine.drives, 1e-9);
+    EXPECT_NEAR(coarse.boundaries, fine.boundaries, 1e-9);
+    EXPECT_NEAR(coarse.amps, fine.amps, 1e-9);
+    EXPECT_EQ(coarse.readings, fine.readings);
+    EXPECT_NEAR(coarse.housing, fine.housing, 1e-9);
+    EXPECT_NEAR(coarse.core, fine.core, 1e-9);
+    EXPECT_NEAR(coarse.housing_s, fine.housing_s, 1e-3);  // places are floats
+    EXPECT_NEAR(coarse.core_s, fine.core_s, 1e-3);
+    EXPECT_NEAR(coarse.idle_s, fine.idle_s, 1e-9);
+    for (const identify::Bin& bin : few.bins) EXPECT_EQ(std::isnan(bin.core_degC), bin.core_n == 0);
+  }
+  log.bins.resize(59);  // the last one then holds fewer
+  EXPECT_DOUBLE_EQ(identify::merged(log, 3).bins.back().signed_A, (log.bins[57].signed_A + log.bins[58].signed_A) / 2);
+}
+
+/// Currents that step anywhere, a winding read all the time or (`every` rows) now and then.
+identify::Bins stepping(double width_s, std::size_t every) {
+  identify::Log log;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> amps(-9, 9), hold_s(0.4, 14);
+  double until_s = 0, now_A = 0;
+  for (std::size_t i = 0; i < 3000; ++i) {
+    const double time_s = 0.1 * static_cast<double>(i);
+    if (time_s >= until_s) now_A = amps(random), until_s = time_s + hold_s(random);
+    log.of(identify::Role::time).push_back(time_s);
+    log.of(identify::Role::current).push_back(now_A);
+    log.of(identify::Role::housing).push_back(25);
+    log.of(identify::Role::core).push_back(i % every == 0 ? 25 : std::nan(""));
+  }
+  return identify::bins_of(log, width_s);
+}
+
+TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
+  const Problem problem = problem_from(off_sheet(9));
+  Fit two = identify::fit(problem, {});
+  two.x[2] = std::log(15.0);  // J/K: a winding that follows a step within 16 s, by 5 K/s
+  Fit hot = two;
+  hot.chosen = {{identify::cause_named("hot_spot"), -1}};
+  hot.x.resize(two.x.size() + 2);
+  hot.x << two.x.head(identify::base_count), std::log(8.0), std::log(1.5),
+      two.x.tail(two.x.size() - identify::base_count);
+  const auto readings = [&](const Fit& f, const identify::Bins& log) {
+    Problem other = problem;
+    other.logs = {log};
+    const auto at_each = identify::replayed(other, f, 0).core_degC;
+    // Of the readings in each two seconds, the mean.
+    std::vector<double> mean(150), number(150);
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      const auto window = static_cast<std::size_t>((static_cast<double>(k) + 0.5) * log.width_s / 2);
+      const double n = static_cast<double>(log.bins[k].core_n);
+      mean.at(window) += n * at_each[k];
+      number.at(window) += n;
+    }
+    for (std::size_t w = 0; w < mean.size(); ++w) mean[w] /= number[w];
+    return mean;
+  };
+  for (const std::size_t every : {1u, 7u}) {
+    for (const Fit& f : {two, hot}) {
+      const auto fine = readings(f, stepping(0.1, every));
+      for (const identify::Bins& log : {stepping(2, every), identify::merged(stepping(0.1, every), 20)}) {
+        const auto coarse = readings(f, log);
+        double worst = 0;
+        for (std::size_t w = 0; w < fine.size(); ++w) {
+          if (!std::isnan(fine[w])) worst = std::max(worst, std::abs(coarse[w] - fine[w]));
+        }
+        EXPECT_LT(worst, 0.4) << "K, read every " << every << " rows; 1.8 to 5 without Bin::core_ahead";
+      }
+    }
+  }
 }
 
 TEST(Replay, IrregularSamplesGiveTheSameParameters) {

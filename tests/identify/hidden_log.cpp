@@ -113,7 +113,7 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "speed_cooling") x.speed_cooling_per_speed08 = k / std::pow(0.4 * top, 0.8);
   if (id == "natural_convection") x.convection_exponent = std::min(0.5, 0.3 * k);
   if (id == "radiation") x.radiation_W_per_K = k * G2;
-  if (id == "cooling_change") x.cooling_change = std::exp(-a), x.cooling_change_s = when_s;
+  if (id == "cooling_change") x.cooling_change = std::clamp(std::exp(-a), 0.2, 5.0), x.cooling_change_s = when_s;
   if (id == "third_mass")
     x.third_mass_J_per_K = m.C2_J_per_K * (0.3 + 1.0 * k), x.third_mass_K_per_W = m.R2_K_per_W * (other ? 0.3 : 0.8);
   if (id == "hot_spot")
@@ -226,11 +226,31 @@ double rms(const std::vector<double>& a, const std::vector<double>& b) {
 }  // namespace
 
 std::vector<std::string> hideable() {
-  return {"speed_loss_linear",  "speed_loss_quadratic", "windage",          "winding_eddy",     "ac_copper_loss",
-          "load_friction",      "copper_coefficient",   "bridge_loss",      "current_offset",   "board_heat",
-          "constant_heat",      "speed_cooling",        "natural_convection", "radiation",      "cooling_change",
-          "third_mass",         "hot_spot",             "neighbour_heat",   "frame_conduction", "sensor_lag",
-          "sensor_offset",      "sensor_gain",          "ambient_drift",    "clock_delay",      "stall_imbalance"};
+  return {"speed_loss_linear",
+          "speed_loss_quadratic",
+          "windage",
+          "winding_eddy",
+          "ac_copper_loss",
+          "load_friction",
+          "copper_coefficient",
+          "bridge_loss",
+          "current_offset",
+          "board_heat",
+          "constant_heat",
+          "speed_cooling",
+          "natural_convection",
+          "radiation",
+          "cooling_change",
+          "third_mass",
+          "hot_spot",
+          "neighbour_heat",
+          "frame_conduction",
+          "sensor_lag",
+          "sensor_offset",
+          "sensor_gain",
+          "ambient_drift",
+          "clock_delay",
+          "stall_imbalance"};
 }
 
 std::vector<std::string> outside() {
@@ -291,7 +311,8 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   for (std::size_t e = 0; o.strength > 0 && e < o.effects.size(); ++e) {
     const bool other = d.uniform(0, 1) < 0.5;
     const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds;
-    const double wanted = d.log_uniform(least_error_K, largest_error_K) * o.strength;
+    const double wanted = o.strength * (o.mostly_small ? d.log_uniform(least_error_K, largest_error_K)
+                                                       : d.uniform(least_error_K, largest_error_K));
     double a = 0.2 * sign, error = 0;
     for (int i = 0; i < 4; ++i) {
       HiddenEffects one;

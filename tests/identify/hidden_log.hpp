@@ -27,7 +27,8 @@ struct HiddenLogOptions {
   std::uint64_t seed = 1;
   std::vector<std::string>
       effects;  // cause ids; "latent", "gusts", "contact", "grease", "thermostat", "curing", "overload" are outside
-  double strength = 1;  // of the size drawn (1..10 K)
+  double strength = 1;        // of the size drawn
+  bool mostly_small = false;  // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
   double structure =
       0.1;  // teeth, yoke, frame as share of host-sim's defaults: how far the clean motor is from two nodes
   double seconds = 1200;

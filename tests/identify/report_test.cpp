@@ -16,6 +16,7 @@
 #include "identify/held_out.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
+#include "tests/identify/slow_build.hpp"
 
 namespace {
 
@@ -89,6 +90,51 @@ TEST(Report, ACauseThatDoesNotGoOnIsRefusedByTheDataNotFitted) {
   EXPECT_NE(veto("ambient_drift").find("refused"), std::string::npos);
   options.extra_housing_W = [](double t, double, double) { return 0.001 * t; };
   EXPECT_EQ(veto("ambient_drift"), "");
+}
+
+std::vector<identify::Log> bench_logs(std::initializer_list<tests::BenchOptions> each) {
+  std::vector<identify::Log> out;
+  for (const tests::BenchOptions& options : each) {
+    for (auto& log :
+         identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_logs.csv", options)), {}, std::nullopt))
+      out.push_back(std::move(log));
+  }
+  return out;
+}
+
+TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
+  tests::BenchOptions fan, still, unseen;
+  for (auto* o : {&fan, &still, &unseen}) o->core_every_s = 20;
+  fan.motor.R2 /= 4;
+  still.seed = 2;
+  unseen.seed = 3;
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  const auto problem = identify::problem_of(bench_logs({fan, still}), motor);
+  int cause = identify::cause_named("cooling_change");
+  while (identify::causes()[static_cast<std::size_t>(cause)].edit != identify::Edit::cooling_of_log) ++cause;
+  identify::HoldOut held;
+  held.logs = bench_logs({unseen});
+  identify::Report report;
+  const auto base = identify::fit(problem, {}), extended = identify::fit(problem, {{cause, 0}});
+  const auto scored = identify::score_held_out(problem, motor, held, base, extended, report);
+  EXPECT_LT(scored.after.core_K, 0.5);
+  EXPECT_GT(scored.before.core_K, 2);
+}
+
+TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
+  tests::BenchOptions one, other;
+  for (auto* o : {&one, &other}) o->core_every_s = 2;
+  one.power_gain = 1;
+  other.power_gain = 1.4;  // recorded over true
+  other.seed = 2;
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  const identify::Report report = identify::discover(bench_logs({one, other}), motor);
+  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+  EXPECT_EQ(report.causes[0].id, "power_share");
+  EXPECT_NEAR(std::abs(std::log(report.causes[0].parameters[0].value)), std::log(1.4), 0.02);
+  other.power_gain = 1;
+  EXPECT_EQ(identify::discover(bench_logs({one, other}), motor).verdict, "adequate");
 }
 
 TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
@@ -280,15 +326,77 @@ TEST(MeasuredData, AFanMakesNoSessionTooShort) {
   const std::string still = data + "tass_run1.csv " + data + "tass_run3.csv ";
   const std::string all = said(still + data + "tass_run4_fan.csv");
   EXPECT_EQ(all.find("Verdict: insufficient"), std::string::npos) << all;
-  EXPECT_NE(all.find("~ cooling_change"), std::string::npos) << all;
   EXPECT_NE(said(still).find("less than the housing's time constant"), std::string::npos);
 }
 
-TEST(MeasuredData, CoppersCoefficientMakesPaderbornWorse) {
+json answer(const std::string& arguments) {
+  const Outcome r = run(arguments + " --json -");
+  EXPECT_EQ(r.code, 0) << r.out;
+  return json::parse(r.out);
+}
+
+const json& paderborn() {
+  static const json j = answer(data + "paderborn_groupA.csv --map " + maps + "paderborn.toml");
+  return j;
+}
+
+bool tied(const json& j, const std::vector<std::string>& ids) {
+  return std::find(j["tied"].begin(), j["tied"].end(), json(ids)) != j["tied"].end();
+}
+
+TEST(MeasuredData, EveryAnswerHoldsTheFanAndTheJointModelMissesByFiveKelvin) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
-  const Outcome r = run(data + "paderborn_groupA.csv --map " + maps + "paderborn.toml --json -");
-  ASSERT_EQ(r.code, 0) << r.out;
-  const json j = json::parse(r.out);
+  const json j = answer(data + "tass_run1.csv " + data + "tass_run3.csv " + data + "tass_run4_fan.csv --map " + maps +
+                        "tass.toml");
+  EXPECT_TRUE(tied(j, {"cooling_change", "power_share"})) << j["sentence"];
+  for (const auto& ids : j["tied"]) EXPECT_EQ(ids[0], "cooling_change") << "whatever else, the fan: " << j["sentence"];
+  EXPECT_LE(j["tied"].size(), 4u) << j["sentence"];
+  EXPECT_LT(j["rmse_with_causes_K"]["core"], 5.3);
+  EXPECT_LT(j["rmse_with_causes_K"]["housing"], 2.5);
+  EXPECT_NE(j["causes"][0]["name"].get<std::string>().find("tass_run4_fan"), std::string::npos) << j["causes"][0];
+}
+
+TEST(MeasuredData, AtOneSpeedHeatThatDoesNotFollowTheCurrentIsNoMoreThanThat) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const json& j = paderborn();
+  EXPECT_EQ(j["verdict"], "ambiguous");
+  EXPECT_TRUE(tied(j, {"third_mass", "winding_eddy"}) && tied(j, {"enabled_loss", "third_mass"})) << j["sentence"];
+  EXPECT_LE(j["tied"].size(), 6u) << "what misses by more than what is left is no rival";
+  EXPECT_LT(j["rmse_with_causes_K"]["core"], 1.3);
+  EXPECT_LT(j["rmse_with_causes_K"]["housing"], 0.85);
+}
+
+TEST(MeasuredData, AtOneCurrentAndOneSpeedCopperAndSpeedLossCannotBeToldApart) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  std::ifstream whole(data + "paderborn_groupA.csv");
+  const std::string path = (std::filesystem::temp_directory_path() / "hotcore_74_minutes.csv").string();
+  std::ofstream first(path);
+  std::string line;
+  for (std::getline(whole, line), first << line << '\n'; std::getline(whole, line) && std::stod(line) < 74 * 60;)
+    first << line << '\n';
+  first.close();
+  const json j = answer(path + " --map " + maps + "paderborn.toml");
+  EXPECT_EQ(j["verdict"], "ambiguous");
+  EXPECT_TRUE(tied(j, {"copper_coefficient", "third_mass"}) && tied(j, {"third_mass", "winding_eddy"}))
+      << j["sentence"];
+}
+
+TEST(MeasuredData, TwoCausesForetellTheQuarterThatWasNotFitted) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const json j = answer(data + "paderborn_groupA.csv --map " + maps + "paderborn.toml --hold-out 0.25");
+  EXPECT_GT(j["held_out"]["rmse_before_K"]["core"], 10);
+  EXPECT_LT(j["held_out"]["rmse_after_K"]["core"], 4);
+  EXPECT_LE(j["causes"].size(), 2u);
+}
+
+TEST(MeasuredData, CoppersCoefficientMakesPaderbornWorse) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
+  const json& j = paderborn();
   ASSERT_EQ(j["baseline"]["variants"].size(), 2u);
   EXPECT_GT(j["baseline"]["variants"][0]["rmse_K"]["core"].get<double>(),
             1.2 * j["baseline"]["variants"][1]["rmse_K"]["core"].get<double>());

@@ -65,9 +65,9 @@ const std::vector<Row>& rows() {
        Duty::robot,
        Core::none,
        0,
-       {{"named right", right, true, 0.75, 0.30},
-        {"named wrong", wrong, false, 0.015, 0.15},
-        {"right or tied with the truth", covered, true, 0.85, 0.35}}},
+       {{"named right", right, true, 0.75, 0.50},
+        {"named wrong", wrong, false, 0.015, 0.05},
+        {"right or tied with the truth", covered, true, 0.85, 0.60}}},
       {"duty-sparse",
        "robot duty, housing + sparse winding",
        each_cause,
@@ -92,9 +92,9 @@ const std::vector<Row>& rows() {
        Duty::designed,
        Core::dense,
        0,
-       {{"named right", right, true, 0.97, 0.55},
-        {"named wrong", wrong, false, 0.005, 0.12},
-        {"right or tied with the truth", covered, true, 0.98, 0.60}}},
+       {{"named right", right, true, 0.97, 0.65},
+        {"named wrong", wrong, false, 0.005, 0.05},
+        {"right or tied with the truth", covered, true, 0.98, 0.65}}},
       {"clean-duty",
        "nothing hidden, robot duty",
        nothing,
@@ -183,7 +183,7 @@ struct Arguments {
   int seeds = 20, at_most = 0;
   std::uint64_t first = tests::rotating_seed();
   double structure = 0.1, strength = 1;
-  bool verbose = false, explain = false, json = false, check = false, quick = false;
+  bool mostly_small = false, verbose = false, explain = false, json = false, check = false, quick = false;
   identify::Margins margins;
 };
 
@@ -198,6 +198,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       c.log.core = row.core;
       c.log.effects = effects;
       c.log.strength = row.hidden == Hidden::zero ? 0 : a.strength;
+      c.log.mostly_small = a.mostly_small;
       c.log.structure = a.structure;
       c.log.small_ones = row.hidden == Hidden::dominant;
       std::uint64_t mixed = 0;
@@ -221,12 +222,13 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
 
 /// What a row's answers say beside its own bounds.
 void add_measures(const Row& row, const std::vector<CaseResult>& results, Table& table) {
-  int far = 0, far_named = 0, near = 0, near_named = 0, ties = 0, resolved = 0, parameters = 0, parameters_right = 0,
-      worse = 0;
+  int far = 0, far_named = 0, near = 0, near_named = 0, seen = 0, seen_named = 0, seen_covered = 0, ties = 0,
+      resolved = 0, parameters = 0, parameters_right = 0, worse = 0;
   std::vector<double> ratios;
   for (const CaseResult& r : results) {
     if (r.D && *r.D > 40) ++far, far_named += right(r);
     if (r.D && *r.D < 3) ++near, near_named += r.named();
+    if (r.D && *r.D >= 3) ++seen, seen_named += right(r), seen_covered += covered(r);
     if (r.resolved) ++ties, resolved += *r.resolved;
     parameters += r.parameters;
     parameters_right += r.parameters_right;
@@ -238,6 +240,9 @@ void add_measures(const Row& row, const std::vector<CaseResult>& results, Table&
   table.add_median(row.key, "winding unseen: error before/after", ratios, row.duty == Duty::designed ? 5 : 3, 1.0);
   table.add(row.key, "winding unseen: worse", worse, static_cast<int>(ratios.size()), false, 0.02, 0.30);
   table.add(row.key, "D > 40 named right", far_named, far, true, 0.93, 0.40);
+  // What some rival imitates to within the noise cannot be named, and the line on D < 3 forbids to try.
+  table.add(row.key, "D >= 3 named right", seen_named, seen, true, row.bounds[0].promised, 0.40);
+  table.add(row.key, "D >= 3 right or tied", seen_covered, seen, true, row.bounds[2].promised, 0.40);
   table.add(row.key, "D < 3 named", near_named, near, false, 0.05, 0.40);
   table.add(row.key, "parameters within 2 std. errors", parameters_right, parameters, true, 0.90, 0.40);
   if (row.core == Core::sparse) table.add(row.key, "ties that the advice resolves", resolved, ties, true, 0.80, 0.05);
@@ -351,6 +356,7 @@ int main(int argc, char** argv) {
   app.add_option("--structure", a.structure, "how far the clean motor is from two nodes, 1 = host-sim's default")
       ->capture_default_str();
   app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")->capture_default_str();
+  app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
   app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();
   app.add_option("--second", a.margins.second, "for a second one")->capture_default_str();
   app.add_option("--tie", a.margins.tie, "lead asked for a name")->capture_default_str();
@@ -358,7 +364,7 @@ int main(int argc, char** argv) {
   app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
   app.add_flag("--check", a.check, "end with an error below the floors");
   app.add_flag("--verbose", a.verbose, "one line a log");
-  app.add_flag("--explain", a.explain, "with it, identify's reasoning");
+  app.add_flag("--explain", a.explain, "with --verbose, identify's reasoning");
   app.add_flag("--json", a.json, "the table as JSON");
   CLI11_PARSE(app, argc, argv);
   if (list) {

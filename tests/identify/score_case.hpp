@@ -34,7 +34,7 @@ struct CaseResult {
   std::optional<double> D;
   std::optional<bool> resolved;  // a tie: did the advised experiment, played once, lead to the right name?
   double search_s = 0;
-  std::string remarks;  // one line for a person who looks for reasons
+  std::string remarks;             // one line for a person who looks for reasons
   std::vector<std::string> steps;  // identify's own reasoning
 
   bool named() const;

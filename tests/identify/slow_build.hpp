@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: MIT
+// A search is hundreds of fits; with sanitizers a few of them are enough to look for undefined behaviour.
+#pragma once
+
+#ifdef HOTCORE_TRAP_FLOATS
+constexpr bool slow_build = true;
+#else
+constexpr bool slow_build = false;
+#endif
