@@ -12,8 +12,8 @@ namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double impossible = 1e300;
-/// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930: 3 alarms in 50,
-/// 27 with none), and small enough that lags and delays of a few seconds keep their names (seeds 800, 801).
+/// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small enough
+/// that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
@@ -427,7 +427,14 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     }
     at += parameters;
   }
-  if (last_is_known) return descend(problem, leeway, chosen, c, x, most);
+  if (last_is_known) {
+    Fit f = descend(problem, leeway, chosen, c, x, most);
+    if (warm.size() > 0) return f;
+    // Where the winding is fast and read now and then, too small a capacity has a valley of its own.
+    x[2] += std::log(4.0);
+    Fit larger = descend(problem, leeway, chosen, c, x, most);
+    return larger.cost < f.cost ? larger : f;
+  }
 
   // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one
   // valley. A few steps tell which is worth descending into.

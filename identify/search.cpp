@@ -280,13 +280,6 @@ void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& fi
   base.ratio = ratio_of(base.fit);
   field.base = std::move(base);
   field.singles = singles_of(problem, all, field.base, field.singles);
-  // A cause may only have helped the four out of a poor valley: they start again from where the best ended.
-  if (field.singles.empty()) return;
-  Fit again = fit(problem, {}, {&field.singles.front().fit});
-  if (again.x.size() == 0 || again.cost >= field.base.fit.cost) return;
-  field.base.fit = std::move(again);
-  field.base.ratio = ratio_of(field.base.fit);
-  for (Candidate& c : field.singles) c = candidate(field.base, std::move(c.fit));
 }
 
 void fit_pairs(const Problem& problem, Field& field) {

@@ -259,7 +259,8 @@ std::vector<std::string> outside() {
 
 namespace {
 
-/// One draw; nothing is written where an effect of this motor cannot be as large as it was drawn.
+/// One draw. An effect that this motor cannot show as large as it was drawn is as large as it can be; below 0.9 K
+/// nothing is written.
 std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, const std::string& path) {
   Draw d{std::mt19937_64(o.seed * 7919 + 17 + draw * 6700417)};
   HiddenLog out;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include <filesystem>
+#include <string>
 
 namespace {
 
@@ -14,6 +15,7 @@ class OwnFolder : public ::testing::Environment {
     ASSERT_NE(mkdtemp(name.data()), nullptr) << name;
     folder_ = name;
     setenv("TMPDIR", folder_.c_str(), 1);
+    setenv("TEST_TMPDIR", folder_.c_str(), 1);  // what GoogleTest's TempDir asks for
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
