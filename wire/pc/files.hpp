@@ -11,23 +11,26 @@
 
 namespace wire::pc {
 
-/// Writes `text` beside `path` and renames it into place: whoever reads `path` sees the old file or the new one.
-/// Makes the folder if it is missing. Throws UserError (usage) when the place cannot be written.
+/// Writes `text` beside `path` and renames it into place: whoever reads `path` sees the old file or the new one. A
+/// device or a pipe is written to and stays what it is. Makes the folder if it is missing. Throws UserError (usage)
+/// when the place cannot be written.
 inline void write_whole(const std::string& path, const std::string& text) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();
   if (!folder.empty()) fs::create_directories(folder, error);
-  const std::string unfinished = path + ".part";
+  const bool stays = fs::exists(path, error) && !fs::is_regular_file(path, error) && !fs::is_directory(path, error);
+  const std::string unfinished = stays ? path : path + ".part";
   {
     std::ofstream out(unfinished, std::ios::binary);
     out << text;
     out.flush();
     if (!out) {
-      std::remove(unfinished.c_str());
+      if (!stays) std::remove(unfinished.c_str());
       throw UserError(Exit::usage, path + ": cannot be written; choose another folder or make room.");
     }
   }
+  if (stays) return;
   fs::rename(unfinished, path, error);
   if (error) {
     std::remove(unfinished.c_str());
