@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "wire/pc/user_error.hpp"
 
@@ -40,8 +39,7 @@ std::string in_words(const Loose& loose) {
 }  // namespace
 
 Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
-  constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  Error housing{none, none, 0}, core{none, none, 0};
+  Error housing{missing, missing, 0}, core{missing, missing, 0};
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed r = replayed(problem, f, static_cast<int>(l));
     const Error h = error_of(r.housing_residual_K), c = error_of(r.core_residual_K);
@@ -98,7 +96,7 @@ Problem last_part(const Problem& problem, double fraction) {
     const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
     for (std::size_t k = 0; k < cut; ++k) {
       log.bins[k].housing_n = log.bins[k].core_n = 0;
-      log.bins[k].housing_degC = log.bins[k].core_degC = std::numeric_limits<double>::quiet_NaN();
+      log.bins[k].housing_degC = log.bins[k].core_degC = missing;
     }
   }
   return out;
@@ -126,16 +124,15 @@ std::string core_refusal(const Problem& problem, const Fit& f) {
   if (problem.any_core()) return "";
   if (problem.belief.copper_per_K == 0) {
     return "The winding temperature cannot be found from the housing alone when the heat does not depend on the "
-           "winding: the housing fixes only R2, "
-           "R1 C1 + R2 (C1 + C2) and R1 C1 R2 C2, three numbers for four unknowns. No winding temperature is stated; "
-           "record core_degC or winding_ohm now "
-           "and then.";
+           "winding: the housing fixes only R2, R1 C1 + R2 (C1 + C2) and R1 C1 R2 C2, three numbers for four unknowns. "
+           "No winding temperature is stated; "
+           "record core_degC now and then.";
   }
   const double sd = sd_from_data(f, 0);
   if (sd < 1) return "";
   return fmt::format(
       "This log does not determine R1 (known to a factor of {:.0f}): no winding temperature is stated; record "
-      "core_degC or winding_ohm "
+      "core_degC "
       "now and then, or load the motor until it is hot.",
       std::exp(std::min(sd, 6.0)));
 }
@@ -151,7 +148,6 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
                                   "unit, whether columns are swapped, and --motor.");
   }
   report.fit_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  report.iterations = f.iterations;
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";
   for (const Bins& log : problem.logs) {
     for (const std::string& note : log.notes)
@@ -162,8 +158,8 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
         problem.heated_by_power()
             ? "No motor file was given: the starting values come from the data, and priors are a factor of ten wide."
             : "No motor file was given: the winding's resistance is taken as 1 ohm (3/2 of a phase's) and its "
-              "coefficient as copper's; "
-              "R1 and R2 then come out times the true resistance, C1 and C2 divided by it. Priors are a factor of ten "
+              "coefficient as copper's; R1 and R2 then come out times the true resistance, C1 and C2 divided by it. "
+              "Priors are a factor of ten "
               "wide.");
   }
   report.structure = structure(problem, f);

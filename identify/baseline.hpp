@@ -19,7 +19,7 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
 
 Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
 
-/// A problem whose readings after (1 - fraction) of each log are masked, and the opposite (only those are kept).
+/// Each log without its last `fraction`; and each whole, but with the readings of that part alone.
 Problem first_part(const Problem& problem, double fraction);
 Problem last_part(const Problem& problem, double fraction);
 
@@ -29,7 +29,7 @@ void add_plots(const Problem& problem, const Fit& fit, const std::string& remark
 /// The same for the extended model, into plots that are there already, from the first-th on.
 void add_extended(const Problem& problem, const Fit& fit, Report& report, std::size_t first);
 
-/// Parameter lines of base and causes.
+/// R1, R2, C1 and C2. `inflation`: of the standard errors, where the model leaves more than noise.
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
 
 /// Why no winding temperature may be stated, empty when it may.

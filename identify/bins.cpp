@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "identify/median.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -15,11 +15,8 @@ namespace {
 using thermal::Boundary;
 using thermal::Drive;
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-constexpr double stalled_rad_per_s = 2;
-constexpr std::size_t most_bins = 200000;
-
-double& at(Bin& bin, Drive d) { return bin.input[d]; }
+constexpr double most_bins =
+    200000;  // 36,000 take a search 12 to 17 s on one core (README), so these a minute and a half
 
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 
@@ -42,13 +39,6 @@ std::vector<double> bridged(std::vector<double> v, const std::vector<double>& t)
   return v;
 }
 
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
-
 /// White noise of one reading. Second differences ignore slopes; the median ignores steps and the rest.
 double reading_noise(const std::vector<double>& v) {
   std::vector<double> seen, second;
@@ -65,13 +55,12 @@ double reading_noise(const std::vector<double>& v) {
 }
 
 struct Inputs {
-  std::vector<double> amplitude_A, signed_A, power_W, speed, boundary[thermal::boundary_count];
+  std::vector<double> amplitude_A, signed_A, power_W, speed_rad_per_s, boundary_degC[thermal::boundary_count];
 };
 
 Inputs inputs_of(const Log& log, Bins& out) {
   const auto& t = log.of(Role::time);
   Inputs in;
-  const double amplitude_per_direct = 2 / std::sqrt(3.0);
   if (log.has(Role::current)) {
     in.signed_A = bridged(log.of(Role::current), t);
     for (double& i : in.signed_A) i *= amplitude_per_direct;
@@ -86,13 +75,11 @@ Inputs inputs_of(const Log& log, Bins& out) {
   }
   out.has_power = log.has(Role::power);
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
-  out.has_speed = log.has(Role::speed);
-  in.speed = out.has_speed ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);
+  in.speed_rad_per_s = log.has(Role::speed) ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);
 
   const bool coolant = log.has(Role::coolant);
-  out.has_ambient = coolant || log.has(Role::ambient);
   std::vector<double> sink;
-  if (out.has_ambient) {
+  if (coolant || log.has(Role::ambient)) {
     sink = bridged(log.of(coolant ? Role::coolant : Role::ambient), t);
     if (coolant) out.notes.push_back("The coolant is taken as the sink.");
   } else {
@@ -102,13 +89,11 @@ Inputs inputs_of(const Log& log, Bins& out) {
     out.notes.push_back(
         fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
   }
-  for (auto& b : in.boundary) b = sink;
-  if (log.has(Role::frame))
-    in.boundary[static_cast<int>(Boundary::frame)] = bridged(log.of(Role::frame), t), out.has_frame = true;
-  if (log.has(Role::neighbour)) {
-    in.boundary[static_cast<int>(Boundary::neighbour)] = bridged(log.of(Role::neighbour), t);
-    out.has_neighbour = true;
-  }
+  for (auto& b : in.boundary_degC) b = sink;
+  out.has_frame = log.has(Role::frame);
+  if (out.has_frame) in.boundary_degC[static_cast<int>(Boundary::frame)] = bridged(log.of(Role::frame), t);
+  out.has_neighbour = log.has(Role::neighbour);
+  if (out.has_neighbour) in.boundary_degC[static_cast<int>(Boundary::neighbour)] = bridged(log.of(Role::neighbour), t);
   return in;
 }
 
@@ -151,12 +136,77 @@ void add_ahead(Bins& out, const Log& log, const Inputs& in) {
     now = b;
     Bin& bin = out.bins[b];
     if (!std::isnan(read[i]))
-      bin.core_ahead += (integral - at(bin, heater(out)) * into_s) / static_cast<double>(bin.core_n);
+      bin.core_ahead += (integral - bin.input[heater(out)] * into_s) / static_cast<double>(bin.core_n);
     if (i + 1 < t.size()) integral += heat(i) * (t[i + 1] - t[i]);
   }
 }
 
+/// A whole number of samples a bin, so that all bins hold equally many.
+double width_s_of(const Log& log, double usual_s, double finest_s) {
+  const double duration_s = log.of(Role::time).back();
+  const double wanted_s = std::max({usual_s, std::min(longest_bin_s, finest_s), duration_s / most_bins});
+  return usual_s * std::max(1.0, std::round(wanted_s / usual_s));
+}
+
+/// Each sample's drives and boundaries, for as long as it holds, as means over the bins that it touches.
+void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const Inputs& in) {
+  std::vector<double> covered(out.bins.size(), 0.0);
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const double end = i + 1 < t.size() ? t[i + 1] : t[i] + usual_s;
+    double from = t[i];
+    for (auto b = static_cast<std::size_t>(from / out.width_s + 1e-9); b < out.bins.size() && from < end; ++b) {
+      const double to = std::min(end, out.width_s * static_cast<double>(b + 1));
+      const double share = std::max(0.0, to - from) / out.width_s;
+      Bin& bin = out.bins[b];
+      covered[b] += share;
+      add_moment(bin, share, in.signed_A[i], in.amplitude_A[i], in.speed_rad_per_s[i]);
+      bin.input[Drive::power_W] += share * in.power_W[i];
+      for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary_degC[s][i];
+      from = to;
+    }
+  }
+  for (std::size_t b = 0; b < out.bins.size(); ++b) {
+    Bin& bin = out.bins[b];
+    const double scale = covered[b] > 0 ? 1 / covered[b] : 0;
+    for (double& d : bin.input.drive) d *= scale;
+    for (double& d : bin.input.boundary_degC) d *= scale;
+    bin.signed_A *= scale;
+    bin.stalled_A2 *= scale;
+  }
+}
+
+void find_idle(Bins& out) {
+  const auto heat = [](const Bin& bin) {
+    return std::max(bin.input[Drive::current_A2], std::abs(bin.input[Drive::power_W]));
+  };
+  double most_heat = 0, most_speed = 0;
+  for (const Bin& bin : out.bins) {
+    most_heat = std::max(most_heat, heat(bin));
+    most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
+  }
+  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
+  for (Bin& bin : out.bins)
+    bin.idle = heat(bin) <= 1e-3 * most_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
+}
+
 }  // namespace
+
+void add_moment(Bin& bin, double share, double signed_A, double amplitude_A, double speed_rad_per_s) {
+  const double a = amplitude_A, w = std::abs(speed_rad_per_s), a2 = a * a;
+  thermal::HeatInput<>& in = bin.input;
+  in[Drive::one] += share;
+  in[Drive::current_A2] += share * a2;
+  in[Drive::current_A] += share * a;
+  in[Drive::speed_rad_per_s] += share * w;
+  in[Drive::speed2_rad2_per_s2] += share * w * w;
+  in[Drive::speed3_rad3_per_s3] += share * w * w * w;
+  in[Drive::current2_speed2] += share * a2 * w * w;
+  in[Drive::current_speed] += share * a * w;
+  in[Drive::enabled] += share * (a > 0 || w > 0 ? 1 : 0);
+  in[Drive::speed_to_0_8] += share * (w > 0 ? std::pow(w, 0.8) : 0);
+  bin.signed_A += share * signed_A;
+  bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
+}
 
 Bins bins_of(const Log& log, double finest_s) {
   Bins out;
@@ -164,80 +214,33 @@ Bins bins_of(const Log& log, double finest_s) {
   out.missing_share = log.missing_share;
   out.gap_share = log.gap_share;
   out.notes = log.notes;
-  const auto& t = log.of(Role::time);
-  std::vector<double> spacing;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  const double usual_s = median(spacing);
-  const double duration_s = t.back();
-  if (!(usual_s > 0) || t.size() < 30) {
-    throw wire::pc::UserError(wire::pc::Exit::unusable,
-                              fmt::format("{}: {} rows over {:.1f} s are too few to fit a motor; record some minutes.",
-                                          log.name, t.size(), duration_s));
-  }
-  out.width_s = std::max({usual_s, std::min(longest_bin_s, finest_s), duration_s / static_cast<double>(most_bins)});
-  // A whole number of samples a bin, so that all bins hold equally many.
-  out.width_s = usual_s * std::max(1.0, std::round(out.width_s / usual_s));
-
-  const Inputs in = inputs_of(log, out);
-  const auto count = static_cast<std::size_t>((duration_s + usual_s) / out.width_s + 1e-6);
-  out.bins.assign(std::max<std::size_t>(count, 1), Bin{});
-  std::vector<double> covered(out.bins.size(), 0.0);
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    const double end = i + 1 < t.size() ? t[i + 1] : t[i] + usual_s;
-    const double a = in.amplitude_A[i], w = std::abs(in.speed[i]), a2 = a * a, w08 = w > 0 ? std::pow(w, 0.8) : 0;
-    double from = t[i];
-    for (auto b = static_cast<std::size_t>(from / out.width_s + 1e-9); b < out.bins.size() && from < end; ++b) {
-      const double to = std::min(end, out.width_s * static_cast<double>(b + 1));
-      const double share = std::max(0.0, to - from) / out.width_s;
-      Bin& bin = out.bins[b];
-      covered[b] += share;
-      at(bin, Drive::one) += share;
-      at(bin, Drive::current_A2) += share * a2;
-      at(bin, Drive::current_A) += share * a;
-      at(bin, Drive::speed_rad_per_s) += share * w;
-      at(bin, Drive::speed2_rad2_per_s2) += share * w * w;
-      at(bin, Drive::speed3_rad3_per_s3) += share * w * w * w;
-      at(bin, Drive::current2_speed2) += share * a2 * w * w;
-      at(bin, Drive::current_speed) += share * a * w;
-      at(bin, Drive::enabled) += share * (a > 0 || w > 0 ? 1 : 0);
-      at(bin, Drive::power_W) += share * in.power_W[i];
-      bin.signed_A += share * in.signed_A[i];
-      at(bin, Drive::speed_to_0_8) += share * w08;
-      bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
-      for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary[s][i];
-      from = to;
-    }
-  }
-  for (std::size_t b = 0; b < out.bins.size(); ++b) {
-    Bin& bin = out.bins[b];
-    bin.housing_degC = bin.core_degC = missing;
-    const double scale = covered[b] > 0 ? 1 / covered[b] : 0;
-    for (double& d : bin.input.drive) d *= scale;
-    for (double& d : bin.input.boundary_degC) d *= scale;
-    bin.signed_A *= scale;
-    bin.stalled_A2 *= scale;
-  }
-  add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
-  add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
-  add_ahead(out, log, in);
   out.has_housing = log.has(Role::housing);
   out.has_core = log.has(Role::core);
   out.housing_noise_K = reading_noise(log.of(Role::housing));
   out.core_noise_K = reading_noise(log.of(Role::core));
 
-  double most_heat = 0, most_speed = 0;
-  for (const Bin& bin : out.bins) {
-    most_heat = std::max({most_heat, bin.input.drive[static_cast<int>(Drive::current_A2)],
-                          std::abs(bin.input.drive[static_cast<int>(Drive::power_W)])});
-    most_speed = std::max(most_speed, bin.input.drive[static_cast<int>(Drive::speed_rad_per_s)]);
-  }
-  for (Bin& bin : out.bins) {
-    const double heat = std::max(bin.input.drive[static_cast<int>(Drive::current_A2)],
-                                 std::abs(bin.input.drive[static_cast<int>(Drive::power_W)]));
-    // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
-    bin.idle = heat <= 1e-3 * most_heat &&
-               bin.input.drive[static_cast<int>(Drive::speed_rad_per_s)] <= 0.02 * most_speed + 1e-9;
-  }
+  const auto& t = log.of(Role::time);
+  std::vector<double> spacing;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
+  const double usual_s = median(spacing);
+  const auto refuse = [&](const std::string& what) {
+    throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
+  };
+  if (t.size() < 30)
+    refuse(fmt::format("only {} row{} over {:.1f} s, too few to fit a motor; record some minutes.", t.size(),
+                       t.size() == 1 ? "" : "s", t.back()));
+  if (!(usual_s > 0))
+    refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
+  out.width_s = width_s_of(log, usual_s, finest_s);
+  const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);
+  out.bins.assign(std::max<std::size_t>(count, 1), Bin{});
+  for (Bin& bin : out.bins) bin.housing_degC = bin.core_degC = missing;
+  const Inputs in = inputs_of(log, out);
+  add_inputs(out, t, usual_s, in);
+  add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
+  add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
+  add_ahead(out, log, in);
+  find_idle(out);
   return out;
 }
 

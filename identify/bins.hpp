@@ -9,6 +9,7 @@
 // heats alike through two terminals, so i = 2/sqrt(3) times it (wire/motor.hpp).
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,15 @@
 
 namespace identify {
 
+/// Amplitude of the current vector over the direct current that heats alike.
+inline const double amplitude_per_direct = 2 / std::sqrt(3.0);
+inline constexpr double stalled_rad_per_s = 2;  // about three seconds a turn
+inline constexpr double longest_bin_s = 2;
+
 struct Bin {
   thermal::HeatInput<double> input;  // means over the bin
   double signed_A;                   // mean current with its sign
-  double stalled_A2;                 // mean i^2 while |w| is below 2 rad/s: about three seconds a turn
+  double stalled_A2;                 // mean of i^2 while |w| is below stalled_rad_per_s, else of 0
   double housing_degC, core_degC;    // mean reading, NaN: none
   float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
   float housing_n, core_n;           // readings in it
@@ -34,8 +40,7 @@ struct Bins {
   std::string name;
   double width_s = 0;
   std::vector<Bin> bins;
-  bool has_speed = false, has_power = false, has_ambient = false, has_frame = false, has_neighbour = false,
-       has_core = false, has_housing = false;
+  bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
   double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences
   double missing_share = 0, gap_share = 0;
   std::vector<std::string> notes;
@@ -43,10 +48,12 @@ struct Bins {
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 
-inline constexpr double longest_bin_s = 2;
-
-/// `finest_s`: bins no longer than this where the sampling allows it (half the winding's time constant).
+/// `finest_s`: bins no longer than this where the sampling allows it (half the winding's time constant). Throws
+/// UserError (unusable) when the rows are too few, or share their times.
 Bins bins_of(const Log& log, double finest_s);
+
+/// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. Speed mechanical.
+void add_moment(Bin& bin, double share, double signed_A, double amplitude_A, double speed_rad_per_s);
 
 /// Every `together` bins as one.
 Bins merged(const Bins& log, std::size_t together);

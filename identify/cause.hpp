@@ -68,9 +68,9 @@ struct Cause {
   thermal::Boundary boundary;
   Needs needs;
   std::vector<Parameter> parameters;
-  const char* signature;
-  const char* rivals;
-  const char* experiment;
+  const char* signature;   // how it shows
+  const char* rivals;      // ids it is easily taken for
+  const char* experiment;  // what tells them apart
 };
 
 const std::vector<Cause>& causes();
@@ -160,8 +160,8 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       model.offset = true;
       break;
     case Edit::sensor_lag:
-      set.housing.lag_s = k[0] + 0.02;
-      break;  // a lag of zero has no slope to fit by
+      set.housing.lag_s = k[0] + 0.02;  // s: a lag of zero has no slope to fit by
+      break;
     case Edit::sensor_offset:
       set.housing.offset_K = k[0];
       break;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The table of causes. Bounds and typical sizes are in units of the scale of each parameter (cause.hpp). Typical: of heat
-// what catalogue no-load losses of small brushless motors amount to, 0.3 of the mean copper heat, and a third more; of
-// sensors and clocks a third of the bound; of couplings and cooling a tenth.
+// The table of causes. Bounds and typical sizes are in units of the scale of each parameter (cause.hpp). Typical: of
+// heat what catalogue no-load losses of small brushless motors amount to, 0.3 of the mean copper heat, and a third
+// more; of sensors and clocks a third of the bound; of couplings and cooling a tenth.
 #include "identify/cause.hpp"
 
 namespace identify {

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <numbers>
 #include <vector>
 
 #include "identify/log.hpp"
@@ -18,7 +19,7 @@ namespace {
 using wire::pc::Exit;
 using wire::pc::UserError;
 
-constexpr double pi = 3.14159265358979323846;
+using std::numbers::pi;
 
 const std::map<std::string, Unit>& units() {
   static const std::map<std::string, Unit> table = {
@@ -98,7 +99,7 @@ ColumnMap read_map(const std::string& path) {
   }
   for (const auto& [key, unused] : file) {
     if (key.str() != "columns" && key.str() != "note") {
-      throw UserError(Exit::usage, fmt::format("{}: unknown key '{}'{}; a map holds [columns] and note.", path,
+      throw UserError(Exit::usage, fmt::format("{}: unknown key '{}'{} (a map holds [columns] and note).", path,
                                                key.str(), wire::pc::did_you_mean(key.str(), {"columns", "note"})));
     }
   }

@@ -12,6 +12,7 @@
 #include "identify/held_out.hpp"
 #include "identify/model_file.hpp"
 #include "identify/search.hpp"
+#include "wire/pc/user_error.hpp"
 
 namespace identify {
 namespace {
@@ -22,63 +23,82 @@ std::string listed(const std::vector<std::string>& ids, const char* between) {
   return out;
 }
 
-void tell(const Problem& problem, const Search& found, Report& report) {
-  report.verdict = word(found.verdict);
-  report.tied = found.tied;
-  report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
+bool holds(const std::vector<std::string>& ids, const std::string& id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+bool named_clearly(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
+
+/// Every cause once, best first, though a cause of one log was tried in each of them.
+std::vector<Rung> ladder_of(const Search& found) {
+  std::vector<Rung> out;
   std::set<std::string> seen;
   for (const Candidate& c : found.singles) {
     const std::string id = ids_of(c.fit.chosen).front();
     if (!seen.insert(id).second) continue;
-    const bool tied = std::any_of(found.tied.begin(), found.tied.end(),
-                                  [&](const auto& ids) { return std::find(ids.begin(), ids.end(), id) != ids.end(); });
-    const bool named = found.verdict == Verdict::explained || found.verdict == Verdict::partly_explained;
-    const bool chosen = named && !found.tied.empty() &&
-                        std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
-    report.ladder.push_back(
+    const bool chosen = named_clearly(found.verdict) && !found.tied.empty() && holds(found.tied.front(), id);
+    const bool tied =
+        std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
+    out.push_back(
         {id, causes()[static_cast<std::size_t>(c.fit.chosen.front().cause)].name, c.gain, chosen, tied && !chosen});
   }
+  return out;
+}
+
+/// What stands in a cause's place in the other sets of the tie, and how far behind.
+std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
+  std::vector<Rival> out;
+  for (const Candidate& c : found.sets) {
+    const auto theirs = ids_of(c.fit.chosen);
+    if (!c.tied || holds(theirs, id)) continue;
+    for (const std::string& other : theirs) {
+      const bool known = std::any_of(out.begin(), out.end(), [&](const Rival& r) { return r.id == other; });
+      if (!known && !holds(found.tied.front(), other)) out.push_back({other, found.chosen.gain - c.gain});
+    }
+  }
+  return out;
+}
+
+void tell(const Problem& problem, const Search& found, Report& report) {
+  report.verdict = word(found.verdict);
+  report.tied = found.tied;
+  report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
+  report.ladder = ladder_of(found);
+  if (!named_clearly(found.verdict) && found.verdict != Verdict::ambiguous) return;
   const Fit& f = found.chosen.fit;
-  if (found.verdict == Verdict::adequate || found.verdict == Verdict::unknown_cause ||
-      found.verdict == Verdict::insufficient)
-    return;
   for (std::size_t i = 0; i < f.chosen.size(); ++i) {
     const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[i].cause)];
-    CauseLine line{cause.id, cause.name, cause.signature, found.chosen.gain, cause_lines(problem, f, i), {}};
+    CauseLine line;
+    line.id = cause.id;
+    line.name = cause.name;
     if (f.chosen[i].log >= 0)
       line.name += fmt::format("; here: {}", problem.logs[static_cast<std::size_t>(f.chosen[i].log)].name);
-    // What stands in its place in the other sets of the tie, and how far behind.
-    for (const Candidate& c : found.sets) {
-      if (!c.tied) continue;
-      for (const std::string& id : ids_of(c.fit.chosen)) {
-        const bool mine =
-            std::find(found.tied.front().begin(), found.tied.front().end(), id) != found.tied.front().end();
-        const bool there =
-            std::any_of(line.rivals.begin(), line.rivals.end(), [&](const Rival& r) { return r.id == id; });
-        const auto without = ids_of(c.fit.chosen);
-        const bool replaces = std::find(without.begin(), without.end(), cause.id) == without.end();
-        if (!mine && !there && replaces) line.rivals.push_back({id, found.chosen.gain - c.gain});
-      }
-    }
-    report.causes.push_back(line);
+    line.signature = cause.signature;
+    line.easily_taken_for = cause.rivals;
+    line.experiment = cause.experiment;
+    line.evidence = found.chosen.gain;
+    line.parameters = cause_lines(problem, f, i);
+    line.rivals = rivals_of(cause.id, found);
+    report.causes.push_back(std::move(line));
   }
 }
 
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   const bool core = !std::isnan(e.core_K);
-  const std::string miss = fmt::format("the two-resistor model misses the {} by {:.2f} K rms",
-                                       core ? "winding" : "housing", core ? e.core_K : e.housing_K);
-  const auto after = [&] { return fmt::format("{:.2f} K", core ? r.extended_rmse.core_K : r.extended_rmse.housing_K); };
+  const std::string by =
+      fmt::format("misses the {} by {:.2f} K rms", core ? "winding" : "housing", core ? e.core_K : e.housing_K);
+  const std::string miss = "the two-resistor model " + by;
+  const std::string miss_and_after =
+      fmt::format("{}, the extended one by {:.2f} K", miss, core ? r.extended_rmse.core_K : r.extended_rmse.housing_K);
   switch (found.verdict) {
     case Verdict::adequate:
-      return fmt::format("The two-resistor model is adequate: {}, no more than the noise explains.", miss.substr(4));
+      return fmt::format("The two-resistor model is adequate: it {}, no more than the noise explains.", by);
     case Verdict::explained:
-      return fmt::format("The motor behaves like {}: {}, with it {}.", listed(found.tied.front(), " and "), miss,
-                         after());
+      return fmt::format("The motor behaves like {}: {}.", listed(found.tied.front(), " and "), miss_and_after);
     case Verdict::partly_explained:
-      return fmt::format("The motor behaves mostly like {}: {}, with it {}; a slow disturbance of {:.2f} K remains.",
-                         listed(found.tied.front(), " and "), miss, after(), found.remains_K);
+      return fmt::format("The motor behaves mostly like {}: {}; a slow disturbance of {:.2f} K remains.",
+                         listed(found.tied.front(), " and "), miss_and_after, found.remains_K);
     case Verdict::ambiguous: {
       std::string sets;
       for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i)
@@ -107,7 +127,7 @@ std::string too_poor(const Problem& problem, const Fit& base) {
       return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
                          100 * log.missing_share);
     if (log.gap_share > 0.3)
-      return fmt::format("{}: gaps make up {:.0f} % of its time.", log.name, 100 * log.gap_share);
+      return fmt::format("{}: gaps make up {:.0f} % of its time; record it again.", log.name, 100 * log.gap_share);
     double low = 1e300, high = -1e300;
     for (const Bin& bin : log.bins) {
       const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
@@ -119,7 +139,7 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
   const auto time_constant_s = [&](const Fit& f) {
-    const Physical p = physical(problem, f.x);
+    const Physical p = physical(f.x);
     return p.R2_K_per_W * p.C2_J_per_K;
   };
   double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
@@ -148,7 +168,7 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) square = std::max(square, bin.input[thermal::Drive::current_A2]);
   }
-  const double rated_A = motor ? motor->motor.rated_current_A * 2 / std::sqrt(3.0) : 0;
+  const double rated_A = motor ? motor->motor.rated_current_A * amplitude_per_direct : 0;
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
@@ -184,6 +204,32 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   return "";
 }
 
+/// Logs to be fitted or scored together must have the same kind of heat; what else only some of them hold is taken for
+/// nothing in the others, and said.
+void compare_columns(const std::vector<Log>& logs, Report& report) {
+  const Log& first = logs.front();
+  for (const Log& log : logs) {
+    if (log.has(Role::power) != first.has(Role::power)) {
+      const auto kind = [](const Log& l) { return l.has(Role::power) ? "a power" : "a current"; };
+      throw wire::pc::UserError(wire::pc::Exit::unusable,
+                                fmt::format("{}: its heat is recorded as {}, that of {} as {}; give logs of one kind.",
+                                            log.name, kind(log), first.name, kind(first)));
+    }
+  }
+  const std::pair<Role, const char*> taken[] = {{Role::speed, "the rotor is taken to stand"},
+                                                {Role::neighbour, "the neighbour is taken to be as warm as the sink"},
+                                                {Role::frame, "the frame is taken to be as warm as the sink"}};
+  for (const auto& [role, as] : taken) {
+    const auto has = [role = role](const Log& log) { return log.has(role); };
+    if (std::none_of(logs.begin(), logs.end(), has)) continue;
+    for (const Log& log : logs) {
+      if (!has(log))
+        report.notes.push_back(
+            fmt::format("{}: {} is missing, which another log has; {}.", log.name, own_name(role), as));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
@@ -211,6 +257,9 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
 
 Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held) {
   Report report;
+  std::vector<Log> all = logs;
+  all.insert(all.end(), held.logs.begin(), held.logs.end());
+  compare_columns(all, report);
   const Problem whole = problem_of(logs, motor);
   Problem problem = held.fraction > 0 ? first_part(whole, held.fraction) : whole;
   const Fit base = judge_baseline(problem, logs, motor, report);

@@ -9,14 +9,14 @@
 namespace identify {
 
 /// Two derivatives at a time, as every PC's registers hold them: left to itself the compiler pairs only some.
-using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
+using TwoSlopes [[gnu::vector_size(2 * sizeof(double))]] = double;
 
 template <int N>
 struct Dual {
   static_assert(N % 2 == 0);
   static constexpr int pairs = N / 2;
   double v;
-  Pair d[pairs];
+  TwoSlopes d[pairs];
 
   Dual() = default;
   constexpr Dual(double value) : v(value), d{} {}  // implicit: a constant has no derivative
@@ -91,26 +91,6 @@ struct Dual {
     return chain(a, e, e);
   }
   friend Dual log(const Dual& a) { return chain(a, std::log(a.v), 1 / a.v); }
-  friend Dual sqrt(const Dual& a) {
-    const double s = std::sqrt(a.v);
-    return chain(a, s, 0.5 / s);
-  }
-  friend Dual abs(const Dual& a) { return a.v < 0 ? -a : a; }
-  friend Dual fabs(const Dual& a) { return abs(a); }
-  friend Dual tanh(const Dual& a) {
-    const double t = std::tanh(a.v);
-    return chain(a, t, 1 - t * t);
-  }
-  friend Dual pow(const Dual& a, double k) { return chain(a, std::pow(a.v, k), k * std::pow(a.v, k - 1)); }
-  /// a^k for a > 0.
-  friend Dual pow(const Dual& a, const Dual& k) {
-    const double p = std::pow(a.v, k.v), by_a = p * k.v / a.v, by_k = p * std::log(a.v);
-    Dual r;
-    r.v = p;
-    for (int i = 0; i < pairs; ++i) r.d[i] = by_a * a.d[i] + by_k * k.d[i];
-    return r;
-  }
-  friend bool isfinite(const Dual& a) { return std::isfinite(a.v); }
 };
 
 inline double value_of(double x) { return x; }

@@ -7,14 +7,18 @@
 #include <cmath>
 #include <limits>
 
+#include "thermal/indices.hpp"
+
 namespace identify {
 namespace {
 
 using thermal::Drive;
 
+constexpr double spare_K = 10;  // below the winding's limit: identification must not burn what it measures
+
 struct Protocol {
   const char* why;
-  std::vector<ProfileStep> steps;  // current in units of the log's rms, speed in units of its largest
+  std::vector<ProfileStep> steps;  // current in units of the log's rms (less where it is too hot), speed of its largest
 };
 
 /// Twenty minutes each: what the table's separating experiments ask for.
@@ -64,12 +68,11 @@ const std::vector<Protocol>& protocols() {
 }
 
 /// The protocol as bins of two seconds, no readings yet.
-Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, double amps, double top) {
+Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, double unit_A, double unit_rad_per_s) {
   const Bins& like = problem.logs.front();
   Bins out;
   out.name = "experiment";
   out.width_s = std::min(2.0, 4 * like.width_s);
-  out.has_speed = like.has_speed;
   out.has_housing = true;
   out.has_core = problem.any_core();
   double sink = 0;
@@ -77,28 +80,17 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
   double since_core_s = 0;
   for (const ProfileStep& step : steps) {
     for (double t = 0; t < step.seconds; t += out.width_s) {
-      const double a = std::abs(step.current_A) * amps, w = std::abs(step.speed_rad_per_s) * top;
       Bin bin{};
+      const double amps = step.current_A * unit_A;
+      add_moment(bin, 1, amps, std::abs(amps), step.speed_rad_per_s * unit_rad_per_s);
       auto& in = bin.input;
-      in[Drive::one] = 1;
-      in[Drive::current_A2] = a * a;
-      in[Drive::current_A] = a;
-      in[Drive::speed_rad_per_s] = w;
-      in[Drive::speed2_rad2_per_s2] = w * w;
-      in[Drive::speed3_rad3_per_s3] = w * w * w;
-      in[Drive::current2_speed2] = a * a * w * w;
-      in[Drive::current_speed] = a * w;
-      in[Drive::enabled] = a > 0 || w > 0 ? 1 : 0;
-      in[Drive::speed_to_0_8] = w > 0 ? std::pow(w, 0.8) : 0;
       for (double& b : in.boundary_degC) b = sink;
       // A neighbour that runs on its own: warm in the middle third.
       const double share = static_cast<double>(out.bins.size()) * out.width_s / 1200;
       if (like.has_neighbour && share > 0.33 && share < 0.66) in[thermal::Boundary::neighbour] = sink + 30;
-      bin.signed_A = step.current_A * amps;
-      bin.stalled_A2 = w < 2 ? a * a : 0;
       bin.housing_at = bin.core_at = 0.5f;
       bin.housing_n = static_cast<float>(10 * out.width_s);
-      bin.idle = a == 0 && w == 0;
+      bin.idle = step.current_A == 0 && step.speed_rad_per_s == 0;
       since_core_s += out.width_s;
       if (out.has_core && since_core_s >= 30) bin.core_n = 1, since_core_s = 0;
       out.bins.push_back(bin);
@@ -107,7 +99,7 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
   return out;
 }
 
-/// Fills the readings with what `model` says; returns the hottest winding.
+/// Fills the readings with what `truth` says from rest; returns the hottest winding, degC.
 double fill(Problem& trial, const Fit& truth) {
   Bins& log = trial.logs.front();
   for (Bin& bin : log.bins) bin.housing_degC = bin.core_degC = 0;
@@ -156,12 +148,11 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     for (const Candidate* truth : tied) {
       Problem trial = problem;
       trial.noise = found.noise;
-      // The motor's own limit, with 10 K to spare, under every one of the models: identification must not burn what it
-      // measures.
+      // Under every one of the models.
       cool = false;
       for (int i = 0; i < 12 && !cool; ++i) {
         trial.logs = {bins_for(problem, protocol.steps, amps, top)};
-        cool = fill(trial, truth->fit) < problem.belief.winding_max_degC - 10;
+        cool = fill(trial, truth->fit) < problem.belief.winding_max_degC - spare_K;
         if (!cool) amps *= 0.88;
       }
       if (!cool) break;
@@ -175,18 +166,20 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
       best_D = least;
       best.profile.clear();
       for (const ProfileStep& s : protocol.steps)
-        best.profile.push_back({s.seconds, s.current_A * amps * std::sqrt(3.0) / 2, s.speed_rad_per_s * top});
+        best.profile.push_back({s.seconds, thermal::direct_A(s.current_A * amps), s.speed_rad_per_s * top});
       best.why = protocol.why;
     }
   }
   if (best_D < 0) return std::nullopt;
-  const char* chance = best_D < 3    ? "hardly a chance to tell them apart"
+  const char* chance = best_D < 3    ? "hardly a chance"
                        : best_D < 10 ? "perhaps half a chance"
                        : best_D < 20 ? "a fair chance"
-                       : best_D < 40 ? "about 90 % chance"
+                       : best_D < 40 ? "a chance of about 90 %"
                                      : "near certainty";
-  best.why = fmt::format("{}: at least {:.0f} expected between them, {}; the winding stays below {:.0f} degC", best.why,
-                         best_D, chance, problem.belief.winding_max_degC - 10);
+  best.why = fmt::format(
+      "{}: the tied models then differ by {:.0f} squared noise units or more, {} of telling them apart; the winding "
+      "stays below {:.0f} degC",
+      best.why, best_D, chance, problem.belief.winding_max_degC - spare_K);
   for (const Candidate* c : tied) {
     for (const std::string& id : ids_of(c->fit.chosen)) {
       if (std::find(best.separates.begin(), best.separates.end(), id) == best.separates.end())

@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identify/replay.hpp"
 
 namespace identify {
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-constexpr double impossible = 1e300;
-/// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small enough
-/// that lags and delays of a few seconds keep their names (seeds 800, 801).
+/// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
+/// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
@@ -284,6 +281,13 @@ double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
   return sum;
 }
 
+/// What a bound holds has no part in what the others do.
+void decouple(Eigen::MatrixXd& A, Eigen::Index i, double diagonal) {
+  A.row(i).setZero();
+  A.col(i).setZero();
+  A(i, i) = diagonal;
+}
+
 Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen,
             const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
   const Eigen::Index n = x.size();
@@ -313,9 +317,7 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
     for (Eigen::Index i = 0; i < n; ++i) {
       A(i, i) *= 1 + lambda;
       if (!held[static_cast<std::size_t>(i)]) continue;
-      A.row(i).setZero();
-      A.col(i).setZero();
-      A(i, i) = 1;
+      decouple(A, i, 1);
       b[i] = 0;
     }
     return A.ldlt().solve(b);
@@ -362,10 +364,7 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
     const double sd = c[static_cast<std::size_t>(i)].sd;
     narrowed.row(i) *= sd;
     narrowed.col(i) *= sd;
-    if (!held[static_cast<std::size_t>(i)]) continue;
-    narrowed.row(i).setZero();
-    narrowed.col(i).setZero();
-    narrowed(i, i) = 1;
+    if (held[static_cast<std::size_t>(i)]) decouple(narrowed, i, 1);
   }
   out.narrowing = narrowed.ldlt().vectorD().array().abs().log().sum();
   out.x = x;
@@ -388,10 +387,7 @@ double Fit::surprise() const { return 2 * cost + narrowing; }
 Eigen::VectorXd Fit::std_errors() const {
   Eigen::MatrixXd A = information;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
-    if (!at_bound[static_cast<std::size_t>(i)]) continue;
-    A.row(i).setZero();
-    A.col(i).setZero();
-    A(i, i) = 1e30;
+    if (at_bound[static_cast<std::size_t>(i)]) decouple(A, i, 1e30);  // known, as far as this fit goes
   }
   const Eigen::MatrixXd covariance = A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
   return covariance.diagonal().cwiseMax(0).cwiseSqrt();
@@ -464,7 +460,7 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 }
 
 std::vector<std::vector<double>> ordinary_lateness_K(const Problem& problem, const Fit& two_resistors) {
-  const Physical p = physical(problem, two_resistors.x);
+  const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
   constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
   Fit late = two_resistors;
@@ -515,9 +511,7 @@ Fit transferred(const Problem& other, const Fit& from) {
   return descend(other, Leeway(other), from.chosen, c, x, 30);
 }
 
-Physical physical(const Problem&, const Eigen::VectorXd& x) {
-  return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])};
-}
+Physical physical(const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
 
 double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate) {
   const Parameter& parameter = cause.parameters[static_cast<std::size_t>(p)];
@@ -557,22 +551,22 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
   return out;
 }
 
-Error error_of(const std::vector<double>& residual_K, std::size_t from, std::size_t to) {
+Error error_of(const std::vector<double>& residual_K) {
   double sum = 0, worst = 0;
   int n = 0;
-  for (std::size_t k = from; k < std::min(to, residual_K.size()); ++k) {
-    if (std::isnan(residual_K[k])) continue;
-    sum += residual_K[k] * residual_K[k];
-    worst = std::max(worst, std::abs(residual_K[k]));
+  for (const double r : residual_K) {
+    if (std::isnan(r)) continue;
+    sum += r * r;
+    worst = std::max(worst, std::abs(r));
     ++n;
   }
   return n > 0 ? Error{std::sqrt(sum / n), worst, n} : Error{missing, missing, 0};
 }
 
-double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
-               Eigen::VectorXd* gradient) {
+double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
+                 Eigen::VectorXd* gradient) {
   Evaluation e;
-  if (!evaluate_any(problem, Leeway(problem), chosen, x, e)) return impossible;
+  if (!evaluate_any(problem, Leeway(problem), chosen, x, e)) return 1e300;
   if (gradient != nullptr) *gradient = e.gradient;
   return e.misfit;
 }

@@ -63,27 +63,26 @@ struct Replayed {
 };
 Replayed replayed(const Problem& problem, const Fit& fit, int log);
 
-/// Root mean square and worst of the residuals over a range of bins; NaN when there is no reading.
+/// Root mean square and worst of the residuals; NaN when there is no reading.
 struct Error {
   double rms_K, worst_K;
   int readings;
 };
-Error error_of(const std::vector<double>& residual_K, std::size_t from = 0,
-               std::size_t to = static_cast<std::size_t>(-1));
+Error error_of(const std::vector<double>& residual_K);
 
-/// Physical values.
+/// The base parameters in physical units.
 struct Physical {
   double R1_K_per_W, R2_K_per_W, C1_J_per_K, C2_J_per_K;
 };
-Physical physical(const Problem& problem, const Eigen::VectorXd& x);
+Physical physical(const Eigen::VectorXd& x);
 
 /// Coordinates into physical units, for parameter p of a chosen cause.
 double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate);
 
 Model<double> model_of(const Problem& problem, const Fit& fit, int log);
 
-/// Cost alone at given coordinates (tests compare sensitivities with differences of this), and with gradient.
-double cost_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
-               Eigen::VectorXd* gradient = nullptr);
+/// Misfit at given coordinates, and its gradient (tests compare it with differences of the former).
+double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
+                 Eigen::VectorXd* gradient = nullptr);
 
 }  // namespace identify

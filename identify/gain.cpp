@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "identify/model_file.hpp"
+#include "thermal/indices.hpp"
 #include "thermal/look_ahead.hpp"
 #include "thermal/validate.hpp"
 
@@ -19,6 +20,7 @@ constexpr thermal::PhaseShares turning{{0.5f, 0.5f, 0.5f}};
 // A burst is asked at three times what the motor carries for an hour: an ordinary overload, whatever the motor's size.
 constexpr double burst_over_continuous = 3;
 constexpr double longest_push_s = 600, hour_s = 3600;
+constexpr double asked_over_rms = 50;  // currents up to this are asked about: beyond what any drive gives
 
 /// How this motor is usually run: mean speed features under load, mean temperatures around it.
 thermal::HeatInput<> working_point(const Problem& problem) {
@@ -41,7 +43,7 @@ thermal::HeatInput<> working_point(const Problem& problem) {
   return sum;
 }
 
-/// The working point at a current that turns with the rotor; none at all and no speed: rest.
+/// The working point at a current that turns with the rotor.
 thermal::HeatInput<> under(thermal::HeatInput<> input, double amplitude_A) {
   const double square = amplitude_A * amplitude_A;
   for (const Drive phase : {Drive::phase_a_A2, Drive::phase_b_A2, Drive::phase_c_A2}) input[phase] = 0.5 * square;
@@ -107,7 +109,7 @@ Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::Trus
   CoreEstimator core(believed, settings);
   const thermal::Reading ambient{static_cast<float>(work[Boundary::ambient]), true};
   // A second at rest: the board has heard its sensors.
-  for (int i = 0; i < 100; ++i) core.tick(resting(work), plant.housing(), ambient);
+  for (double t_s = 0; t_s < 1; t_s += estimator_dt_s) core.tick(resting(work), plant.housing(), ambient);
   core.tick(under(work, 0), plant.housing(), ambient);
   const thermal::LookAhead look(core.network());
   Answers out{};
@@ -144,22 +146,28 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
     return std::nullopt;
   const thermal::HeatInput<> work = working_point(problem);
   const thermal::Trust trust = trust_of(extended);
-  const double most_A = 50 * problem.rms_A;
+  const double most_A = asked_over_rms * problem.rms_A;
   const double continuous_A = answers_of(truth, trust, truth, work, most_A, 0).continuous_A;
   if (!(continuous_A > 0)) return std::nullopt;
   const double burst_A = burst_over_continuous * continuous_A;
   const Answers before = answers_of(before_set, trust_of(baseline), truth, work, most_A, burst_A),
                 after = answers_of(truth, trust, truth, work, most_A, burst_A);
-  const double direct = std::sqrt(3.0) / 2;  // amperes as the log has them
-  return Gain{before.overshoot_K,           after.overshoot_K,           before.burst_s,   after.burst_s,
-              before.continuous_A * direct, after.continuous_A * direct, burst_A * direct, work[Drive::speed_rad_per_s],
-              work[Boundary::ambient]};
+  using thermal::direct_A;
+  return Gain{.overshoot_before_K = before.overshoot_K,
+              .overshoot_after_K = after.overshoot_K,
+              .burst_s_before = before.burst_s,
+              .burst_s_after = after.burst_s,
+              .continuous_A_before = direct_A(before.continuous_A),
+              .continuous_A_after = direct_A(after.continuous_A),
+              .burst_A = direct_A(burst_A),
+              .speed_rad_per_s = work[Drive::speed_rad_per_s],
+              .ambient_degC = work[Boundary::ambient]};
 }
 
 const Fit& most_cautious(const Problem& problem, const std::vector<const Fit*>& fits) {
   if (problem.heated_by_power()) return *fits.front();
   const thermal::HeatInput<> work = working_point(problem);
-  const double most_A = 50 * problem.rms_A;
+  const double most_A = asked_over_rms * problem.rms_A;
   // One current for all, above what any of them carries for an hour.
   double burst_A = 0;
   std::vector<std::optional<thermal::HeatSet<double>>> sets;

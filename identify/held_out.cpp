@@ -95,11 +95,9 @@ HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::Motor
     return out;
   }
   out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
-  Problem other = problem_of(held.logs, motor, whole.belief.copper_per_K);
   // Scales and belief are those the parameters were found with; only the inputs are new.
-  const auto logs = other.logs;
-  other = whole;
-  other.logs = logs;
+  Problem other = whole;
+  other.logs = problem_of(held.logs, motor, whole.belief.copper_per_K).logs;
   // What is of one of the fitted logs (a fan) is not of these.
   Fit elsewhere = extended;
   for (Chosen& c : elsewhere.chosen) c.log = -1;

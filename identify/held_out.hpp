@@ -7,7 +7,8 @@
 
 namespace identify {
 
-/// Errors on the data held out by both models, with a bootstrap interval over blocks of a minute and more.
+/// Errors of both models on the data held out, with a bootstrap interval over blocks of a minute. Logs that were held
+/// out are added to the report's plots.
 HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
                        const Fit& base, const Fit& extended, Report& report);
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identify/masks.hpp"
 #include "identify/units.hpp"
@@ -17,8 +16,6 @@ namespace {
 
 using wire::pc::Exit;
 using wire::pc::UserError;
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 const std::array<std::string, role_count>& own_names() {
   static const std::array<std::string, role_count> names = {"time_s",       "current_A",
@@ -37,8 +34,8 @@ Role role_named(const std::string& name, const std::string& where) {
   for (std::size_t r = 0; r < role_count; ++r) {
     if (own_names()[r] == name) return static_cast<Role>(r);
   }
-  throw UserError(Exit::usage, fmt::format("{}: there is no role '{}'{} Roles: {}.", where, name,
-                                           wire::pc::did_you_mean(name, {own_names().begin(), own_names().end()}) + ";",
+  throw UserError(Exit::usage, fmt::format("{}: there is no role '{}'{} (roles: {}).", where, name,
+                                           wire::pc::did_you_mean(name, {own_names().begin(), own_names().end()}),
                                            fmt::join(own_names(), ", ")));
 }
 
@@ -49,7 +46,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
   for (const auto& [role, source] : map.columns) {
     if (table.find(source.column) < 0) {
       throw UserError(Exit::unusable,
-                      fmt::format("{}: column '{}' for {} is missing{}; the file has: {}.", table.file, source.column,
+                      fmt::format("{}: column '{}' for {} is missing{} (the file has: {}).", table.file, source.column,
                                   own_name(role), wire::pc::did_you_mean(source.column, table.names),
                                   fmt::join(table.names, ", ")));
     }
@@ -63,8 +60,8 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
       found[role] = {name};
       continue;
     }
-    const std::size_t cut = name.find('_', name.rfind("speed", 0) == 0 ? 5 : name.rfind("neighbour", 0) == 0 ? 17 : 0);
-    if (cut == std::string::npos || role == Role::session) continue;
+    const std::size_t cut = role == Role::neighbour ? name.rfind('_') : name.find('_');
+    if (cut == std::string::npos) continue;
     for (const std::string& header : table.names) {
       const bool mapped =
           std::any_of(map.columns.begin(), map.columns.end(), [&](const auto& m) { return m.second.column == header; });
@@ -76,6 +73,12 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
             fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
                         table.file, header, unit, name, name, header, unit));
       }
+    }
+  }
+  for (const auto& [role, source] : found) {
+    if (std::count(table.names.begin(), table.names.end(), source.column) > 1) {
+      throw UserError(Exit::unusable, fmt::format("{}: column '{}' stands there twice; rename or delete one of them.",
+                                                  table.file, source.column));
     }
   }
   return found;
@@ -143,8 +146,9 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     if (peak > most_A) {
       throw UserError(
           Exit::unusable,
-          fmt::format("{}: {} reaches {:.0f} A, more than {:.0f} A can be; if it is in mA say --column {}=COLUMN:mA.",
-                      log.name, own_name(role), peak, most_A, own_name(role)));
+          fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say --column "
+                      "{1}=COLUMN:mA, if it is another quantity map the right column.",
+                      log.name, own_name(role), peak, most_A));
     }
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
@@ -193,12 +197,10 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
   const auto& t = log.of(Role::time);
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] < t[i - 1]) {
-      throw UserError(
-          Exit::unusable,
-          fmt::format(
-              "{}, line {}: time runs backwards from {:g} to {:g} s (two recordings joined, or two clocks); split the "
-              "file there or give it a session column.",
-              table.file, table.line[rows[i]], t[i - 1], t[i]));
+      throw UserError(Exit::unusable, fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s (two "
+                                                  "recordings joined, or two clocks); split the "
+                                                  "file there or give it a session column.",
+                                                  table.file, table.line[rows[i]], t[i - 1], t[i]));
     }
   }
 }
@@ -232,6 +234,9 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
       to.clear();
       log.notes.push_back(
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
+    } else if (role == Role::winding_ohm) {
+      log.notes.push_back(
+          "winding_ohm is not used: a fit sees a resistance only as the temperature it means, core_degC.");
     }
   }
   check_time(table, log, rows);
@@ -252,6 +257,9 @@ void add_column(ColumnMap& map, const std::string& text) {
   const Role role = role_named(text.substr(0, equals), "--column " + text);
   const std::string rest = text.substr(equals + 1);
   const std::size_t colon = rest.rfind(':');
+  if (rest.empty() || colon == 0) {
+    throw UserError(Exit::usage, fmt::format("--column {}: the column's name is missing behind '='.", text));
+  }
   Source source{rest.substr(0, colon)};
   if (colon != std::string::npos)
     apply_unit(rest.substr(colon + 1), own_name(role), "--column " + text, source.factor, source.offset);
@@ -274,10 +282,16 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
        "map it with --column housing_degC=NAME");
 
   std::map<double, std::vector<std::size_t>> sessions;
+  std::size_t in_a_session = 0;
   const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
   for (std::size_t r = 0; r < table.rows(); ++r) {
     const double key = session < 0 ? 0 : table.columns[static_cast<std::size_t>(session)][r];
-    if (!std::isnan(key)) sessions[key].push_back(r);
+    if (!std::isnan(key)) sessions[key].push_back(r), ++in_a_session;
+  }
+  if (sessions.empty()) {
+    throw UserError(Exit::unusable, fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it "
+                                                "or rename it.",
+                                                table.file, found.at(Role::session).column));
   }
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
@@ -288,6 +302,8 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
     check_order(log);
     logs.push_back(std::move(log));
   }
+  if (in_a_session < table.rows())
+    logs.front().notes.push_back(fmt::format("{} rows without a session were left out.", table.rows() - in_a_session));
   return logs;
 }
 

@@ -18,6 +18,7 @@
 
 namespace identify {
 
+/// What a column may be. Bus, board and winding_ohm are read and checked, and nothing is made of them yet.
 enum class Role {
   time,
   current,
@@ -64,8 +65,7 @@ struct Log {
   std::string name;
   std::array<std::vector<double>, role_count> columns;
   std::vector<std::string> notes;  // what was repaired, masked or assumed, one sentence each
-  int rows_frozen = 0, rows_missing = 0;
-  double missing_share = 0;  // of the housing (or core) readings and of the input, what had to be masked
+  double missing_share = 0;  // of housing (else core) readings, of input cells or of whole rows: the worst of these
   double gap_share = 0;      // of the duration, what lies in gaps
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }

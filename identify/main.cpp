@@ -60,7 +60,7 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   return out;
 }
 
-/// Ids in a truth file (host-sim record --hide writes them): { "causes": [ { "id": ... } ] }. Opened after the answer.
+/// Ids in a truth file (host-sim record --hide writes them): { "causes": [ { "id": ... } ] }.
 std::vector<std::string> truth_in(const std::string& path) {
   std::ifstream in(path);
   const auto json = nlohmann::json::parse(in, nullptr, false);
@@ -74,30 +74,38 @@ std::vector<std::string> truth_in(const std::string& path) {
   return ids;
 }
 
-/// Answers each log by itself, then compares with its truth: all five outcomes, one line a log.
+const char* outcome_of(const identify::Report& report, const std::vector<std::string>& named,
+                       const std::vector<std::string>& truth) {
+  const std::string& verdict = report.verdict;
+  if (verdict == "explained" || verdict == "partly_explained") return named == truth ? "named right" : "named wrong";
+  if (verdict == "ambiguous") {
+    const bool among = std::find(report.tied.begin(), report.tied.end(), truth) != report.tied.end();
+    return among ? "tied with the truth" : "tied without it";
+  }
+  if (verdict == "adequate") return truth.empty() ? "rightly silent" : "silent";
+  return "unknown or insufficient";
+}
+
+/// Answers each log by itself, and only then opens its truth: one line a log, then how often each outcome came.
 int score(const Arguments& a, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
   if (a.truths.size() != a.logs.size()) {
     throw UserError(Exit::usage,
                     fmt::format("--score: {} truth files for {} logs; give one for each, in the same order.",
                                 a.truths.size(), a.logs.size()));
   }
+  for (const std::string& path : a.truths) {
+    if (!std::filesystem::is_regular_file(path))
+      throw UserError(Exit::usage, "--score: " + path + ": there is no such file; check the path.");
+  }
   std::map<std::string, int> outcomes;
   fmt::print("{:<40} {:<32} {:<18} {}\n", "log", "truth", "verdict", "answer");
   for (std::size_t i = 0; i < a.logs.size(); ++i) {
-    fmt::print(stderr, "{} of {}\r", i + 1, a.logs.size());
     const identify::Report report = identify::discover(read(a.logs[i], map, motor), motor);
     const auto truth = truth_in(a.truths[i]);
     std::vector<std::string> named;
-    bool tied_with_truth = false;
     for (const auto& cause : report.causes) named.push_back(cause.id);
     std::sort(named.begin(), named.end());
-    for (const auto& set : report.tied) tied_with_truth = tied_with_truth || set == truth;
-    const bool clear = report.verdict == "explained" || report.verdict == "partly_explained";
-    const std::string outcome = clear ? (named == truth ? "named right" : "named wrong")
-                                : report.verdict == "ambiguous"
-                                    ? (tied_with_truth ? "tied with the truth" : "tied without it")
-                                : report.verdict == "adequate" ? (truth.empty() ? "rightly silent" : "silent")
-                                                               : "unknown or insufficient";
+    const std::string outcome = outcome_of(report, named, truth);
     ++outcomes[outcome];
     fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], fmt::format("{}", fmt::join(truth, " + ")), report.verdict,
                fmt::join(named, " + "), outcome);
@@ -120,16 +128,16 @@ int answer(Arguments a) {
   held.draws = a.draws;
   std::vector<Log> logs;
   for (const std::string& path : a.logs) {
+    if (std::count(a.logs.begin(), a.logs.end(), path) > 1)
+      throw UserError(Exit::usage, path + ": this log is named twice and would count twice; name it once.");
     for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
   }
   identify::Report report = identify::discover(logs, motor, held);
   if (!map.note.empty()) report.notes.push_back(map.note);
-  if (!a.write_model.empty()) {
-    wire::pc::write_whole(a.write_model, report.model_toml);
-    report.model_file = a.write_model;
-  }
-  if (!a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
+  report.model_file = a.write_model;
   if (!a.html.empty()) wire::pc::write_whole(a.html, as_html(report));
+  if (!a.write_model.empty()) wire::pc::write_whole(a.write_model, report.model_toml);
+  if (!a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
   if (a.json == "-") {
     fmt::print("{}", as_json(report));
     return 0;
@@ -145,24 +153,38 @@ int answer(Arguments a) {
 int main(int argc, char** argv) {
   CLI::App app{examples};
   Arguments a;
-  app.add_option("LOG", a.logs, "CSV logs of one motor")->required();
-  app.add_option("--motor", a.motor,
-                 "motor file (.toml), or the name of one in boards/motors; without it priors are wide");
+  app.add_option("LOG", a.logs, "CSV logs of one motor, fitted together")->required();
+  app.add_option(
+      "--motor", a.motor,
+      "motor file (.toml), or the name of one in boards/motors (or in the folder that HOTCORE_MOTORS names); "
+      "without it the answer is less certain");
   app.add_option("--map", a.map, "TOML file that says which column is what");
   app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")
       ->allow_extra_args(false);
-  app.add_option("--hold-out", a.hold_out, "a log, or a fraction of each log, that is scored and not fitted");
-  app.add_option("--bootstrap", a.draws, "draws for the interval of the held-out error, 0: none")
+  app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
+  app.add_option("--hold-out", a.hold_out,
+                 "a log, or the last part of each log as a fraction (0.25), that is scored and not fitted");
+  app.add_option("--bootstrap", a.draws,
+                 "how often the held-out error is redrawn for its interval; below 100: no interval")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
-  app.add_option("--json", a.json, "write the answer as JSON; - for standard output");
+  app.add_option("--json", a.json, "write the answer as JSON; - for standard output, and nothing else there");
   app.add_option("--html", a.html, "write a page with pictures");
-  app.add_option("--write-model", a.write_model, "write the model found as a heat-network parameter set");
+  app.add_option("--write-model", a.write_model,
+                 "write the model found as a heat-network parameter set (TOML) that the board runs");
   app.add_option("--write-baseline", a.write_baseline,
-                 "write the two-resistor model as fitted, to compare on the board with what was found");
-  app.add_option("--score", a.truths, "truth files, one a log: print how often each answer was right");
-  app.add_flag("--explain", a.explain, "tell the chain of reasoning");
-  app.footer("Exit codes: 0 an answer was given, 2 usage, 3 the data cannot be used.");
+                 "the same of the two-resistor model as fitted, to compare on the board with what was found");
+  auto* score = app.add_option("--score", a.truths,
+                               "truth files, one a log in the same order: answer each log by itself and print how "
+                               "often that was right");
+  for (const char* other : {"--hold-out", "--json", "--html", "--write-model", "--write-baseline", "--explain"})
+    score->excludes(other);
+  app.footer(
+      "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
+      "the logs cannot be used. With 2 and 3 one sentence on standard error says why.");
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("{}; identify --help lists what there is.\n", error.what());
+  });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -170,7 +192,10 @@ int main(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(Exit::usage);
   }
   try {
-    return answer(a);
+    const int code = answer(a);
+    if (std::fflush(stdout) != 0)
+      throw UserError(Exit::usage, "standard output: cannot be written; the answer is not complete.");
+    return code;
   } catch (const UserError& error) {
     fmt::print(stderr, "{}\n", error.what());
     return error.exit_code();

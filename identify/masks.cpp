@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "identify/median.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -14,15 +14,6 @@ namespace {
 
 using wire::pc::Exit;
 using wire::pc::UserError;
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-
-double median(std::vector<double> v) {
-  if (v.empty()) return missing;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
 
 std::size_t count_missing(const std::vector<double>& v) {
   return static_cast<std::size_t>(std::count_if(v.begin(), v.end(), [](double x) { return std::isnan(x); }));
@@ -43,7 +34,8 @@ double holes(const std::vector<double>& v) {
   return std::max(0.0, 1.0 - static_cast<double>(seen) * grid / static_cast<double>(v.size()));
 }
 
-void report_frozen(Log& log, Role role, std::vector<double>& v) {
+void mask_frozen(Log& log, Role role) {
+  std::vector<double>& v = log.of(role);
   const auto runs = frozen_runs(v);
   if (runs.empty()) return;
   const auto& t = log.of(Role::time);
@@ -55,10 +47,69 @@ void report_frozen(Log& log, Role role, std::vector<double>& v) {
     rows += to - from - 1;
     if (t[to - 1] - t[from] > longest_s) longest_s = t[to - 1] - t[from], from_s = t[from];
   }
-  log.rows_frozen += static_cast<int>(rows);
   log.notes.push_back(
       fmt::format("{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s); masked.",
                   own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
+}
+
+/// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
+void note_missing_input(Log& log) {
+  std::vector<Role> input = {Role::power};
+  if (!log.has(Role::power))
+    input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
+  for (const Role role : input) {
+    const double share =
+        static_cast<double>(count_missing(log.of(role))) / static_cast<double>(log.of(Role::time).size());
+    log.missing_share = std::max(log.missing_share, share);
+    if (share > 0.3) {
+      throw UserError(
+          Exit::unusable,
+          fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
+                      "again with every row filled.",
+                      log.name, own_name(role), 100 * share));
+    }
+    if (share > 0)
+      log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.",
+                                      own_name(role), 100 * share));
+  }
+}
+
+void note_missing_readings(Log& log) {
+  for (const Role role : {Role::housing, Role::core}) {
+    if (!log.has(role)) continue;
+    const double share = holes(log.of(role));
+    if (share > 0.02)
+      log.notes.push_back(
+          fmt::format("{} is missing in {:.0f} % of its readings; left out of the fit.", own_name(role), 100 * share));
+    if (role == Role::housing || !log.has(Role::housing)) log.missing_share = std::max(log.missing_share, share);
+  }
+}
+
+void note_gaps(Log& log) {
+  const auto& t = log.of(Role::time);
+  std::vector<double> spacing;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
+  const double usual = median(spacing);
+  double lost_s = 0;
+  int gaps = 0;
+  for (const double dt : spacing) {
+    // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are
+    // formed.
+    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) lost_s += dt - usual, ++gaps;
+  }
+  const double duration = t.back() - t.front();
+  log.gap_share = duration > 0 ? lost_s / duration : 0;
+  if (gaps > 0) {
+    log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
+                                    gaps, gaps == 1 ? "" : "s", lost_s, duration, gaps == 1 ? "it" : "them"));
+  }
+  // Rows that are missing one by one among the others: the current that flowed in them is not known either.
+  const double rows_lost = duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s) / duration : 0;
+  if (rows_lost > 0.1) {
+    log.notes.push_back(
+        fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).", 100 * rows_lost, usual));
+  }
+  log.missing_share = std::max(log.missing_share, rows_lost);
 }
 
 }  // namespace
@@ -99,65 +150,14 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
 }
 
 void mask(Log& log) {
-  const auto& t = log.of(Role::time);
   for (const Role role :
        {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
-    if (log.has(role)) report_frozen(log, role, log.of(role));
+    if (log.has(role)) mask_frozen(log, role);
   }
-
-  // Input: what heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
-  std::vector<Role> input = {Role::power};
-  if (!log.has(Role::power))
-    input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
-  for (const Role role : input) {
-    const double share = static_cast<double>(count_missing(log.of(role))) / static_cast<double>(t.size());
-    log.missing_share = std::max(log.missing_share, share);
-    if (share > 0.3) {
-      throw UserError(
-          Exit::unusable,
-          fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
-                      "again with every row filled.",
-                      log.name, own_name(role), 100 * share));
-    }
-    if (share > 0)
-      log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.",
-                                      own_name(role), 100 * share));
-  }
-  for (const Role role : {Role::housing, Role::core}) {
-    if (!log.has(role)) continue;
-    const double share = holes(log.of(role));
-    log.rows_missing += static_cast<int>(share * static_cast<double>(t.size()));
-    if (share > 0.02)
-      log.notes.push_back(
-          fmt::format("{} is missing in {:.0f} % of its readings; left out of the fit.", own_name(role), 100 * share));
-    if (role == Role::housing || !log.has(Role::housing)) log.missing_share = std::max(log.missing_share, share);
-  }
-
-  std::vector<double> spacing;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  const double usual = median(spacing);
-  double lost_s = 0;
-  int gaps = 0;
-  for (const double dt : spacing) {
-    // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are
-    // formed.
-    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) lost_s += dt - usual, ++gaps;
-  }
-  const double duration = t.back() - t.front();
-  log.gap_share = duration > 0 ? lost_s / duration : 0;
-  if (gaps > 0) {
-    log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
-                                    gaps, gaps == 1 ? "" : "s", lost_s, duration, gaps == 1 ? "it" : "them"));
-  }
-  // Rows that are missing one by one among the others: the current that flowed in them is not known either.
-  const double rows_lost = duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s) / duration : 0;
-  if (rows_lost > 0.1) {
-    log.notes.push_back(
-        fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).", 100 * rows_lost, usual));
-  }
-  log.missing_share = std::max(log.missing_share, rows_lost);
-  const bool any = log.has(Role::housing) || log.has(Role::core);
-  if (!any)
+  note_missing_input(log);
+  note_missing_readings(log);
+  note_gaps(log);
+  if (!log.has(Role::housing) && !log.has(Role::core))
     throw UserError(Exit::unusable,
                     log.name + ": no temperature of the motor is left; record the housing or the winding.");
 }

@@ -6,8 +6,8 @@
 
 namespace identify {
 
-/// Turns frozen readings into missing ones, counts missing and frozen cells and gaps, and notes each in log.notes.
-/// Throws UserError (unusable) when the heat input or every temperature is missing for most of the time.
+/// Turns frozen readings into missing ones, sums up what is missing and lies in gaps, and notes each in log.notes.
+/// Throws UserError (unusable) when the heat input is missing in three rows of ten, or no temperature is left at all.
 void mask(Log& log);
 
 /// [from, to) row ranges in which a channel stands still at exactly one value although it moves elsewhere.

@@ -14,12 +14,11 @@ namespace {
 
 using thermal::Drive;
 
-double drive(const Bin& bin, Drive d) { return bin.input[d]; }
-
 /// The slow part of the housing noise, from rest. Second differences over eight seconds cancel the cooling curve's
 /// slope; a first-order process of 20 s correlation keeps this much of its variance in them.
 void noise_from_rest(Problem& problem) {
-  constexpr double lag_s = 8, slow_s = 20;
+  constexpr double lag_s = 8;
+  const double slow_s = problem.noise.slow_s;
   const double rho = std::exp(-lag_s / slow_s), kept = 6 - 8 * rho + 2 * rho * rho;
   double sum = 0, white = 0, rest_s = 0, reading2 = 0;
   int n = 0, logs = 0;
@@ -57,10 +56,9 @@ void noise_from_rest(Problem& problem) {
   Noise& noise = problem.noise;
   // A perfectly repeating channel still has its last digit.
   noise.housing_white_K = std::max(0.01, logs > 0 ? std::sqrt(reading2 / logs) : 0.2);
-  noise.slow_s = slow_s;
   const double assumed2 = 0.05 * 0.05;  // a thermistor's slow wander where no rest tells
   const double seen2 = n > 0 ? std::max(0.0, (sum - white) / (n * kept)) : assumed2;
-  const double trust = rest_s / (rest_s + 300);
+  const double trust = rest_s / (rest_s + 300);  // five minutes of rest count as much as what is assumed
   noise.housing_slow_K = std::clamp(std::sqrt(trust * seen2 + (1 - trust) * assumed2), 0.02, 1.0);
   noise.idle_s = rest_s;
 
@@ -84,16 +82,16 @@ void noise_from_rest(Problem& problem) {
   }
 }
 
-void scales(Problem& problem) {
+void set_scales(Problem& problem) {
   double n = 0, heat = 0, amps2 = 0, speed08 = 0;
   problem.duration_s = 0;
   for (double& m : problem.drive_mean) m = 0;
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) {
       for (int d = 0; d < thermal::drive_count; ++d) problem.drive_mean[d] += bin.input.drive[d];
-      heat += problem.heated_by_power() ? std::abs(drive(bin, Drive::power_W))
-                                        : problem.belief.ohm * drive(bin, Drive::current_A2);
-      amps2 += drive(bin, Drive::current_A2);
+      heat += problem.heated_by_power() ? std::abs(bin.input[Drive::power_W])
+                                        : problem.belief.ohm * bin.input[Drive::current_A2];
+      amps2 += bin.input[Drive::current_A2];
       speed08 += bin.input[Drive::speed_to_0_8];
       n += 1;
     }
@@ -114,11 +112,9 @@ void rough_search(Problem& whole) {
   problem.logs = {*longest};
 
   double rise_K = 1;
-  for (const Bins& log : problem.logs) {
-    for (const Bin& bin : log.bins) {
-      const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
-      if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
-    }
+  for (const Bin& bin : longest->bins) {
+    const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+    if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
   }
   Belief best;
   double least = 1e300;
@@ -136,7 +132,7 @@ void rough_search(Problem& whole) {
       if (f.cost >= least || f.x.size() == 0) continue;
       least = f.cost;
       best = b;
-      const Physical p = physical(problem, f.x);
+      const Physical p = physical(f.x);
       best.R1_K_per_W = p.R1_K_per_W;
       best.R2_K_per_W = p.R2_K_per_W;
       best.C1_J_per_K = p.C1_J_per_K;
@@ -244,7 +240,7 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   for (const Log& log : logs) problem.logs.push_back(bins_of(log, finest_s));
   if (problem.heated_by_power()) problem.belief.copper_per_K = 0;
   noise_from_rest(problem);
-  scales(problem);
+  set_scales(problem);
   if (!(problem.heat_W > 0)) {
     throw wire::pc::UserError(
         wire::pc::Exit::unusable,

@@ -95,8 +95,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
     in[Boundary::coolant] += model.drift_K_per_s * time_s;
   }
   if (model.cooling_changes) {
-    in[carrier] =
-        rising(time_s, model.cooling_from_s, 6.0);  // six seconds: short for a housing, long enough for a slope
+    constexpr double rise_s = 6;  // short for a housing, long enough for a slope
+    in[carrier] = rising(time_s, model.cooling_from_s, rise_s);
     in[against] = in[carrier] * (carrier_per_K * (in[Boundary::ambient] - 25.0) + 1.0);
   }
 }
@@ -171,8 +171,8 @@ void prepare_and_run(const Model<S>& model, const Bins& log, const S& core_degC,
 
 }  // namespace replay_detail
 
-/// `most_nodes`: what the model may have at most, so that no more is compiled than can happen.
-/// Replays `log` from core and housing temperatures; `visit(bin, housing reading, core reading)`.
+/// Replays `log` from core and housing temperatures; `visit(bin, housing reading, core reading)`. `most_nodes`: what
+/// the model may have at most, so that no more is compiled than can happen.
 template <int most_nodes, class S, class Visit>
 void replay(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC, Visit&& visit) {
   if (model.set.node_count == 2) return replay_detail::prepare_and_run<2>(model, log, core_degC, housing_degC, visit);

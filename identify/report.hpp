@@ -23,16 +23,18 @@ struct Rmse {
   double housing_worst_K = 0, core_worst_K = 0;
 };
 
+// Evidence is twice a logarithm (search.hpp); the JSON calls it delta_bic, as its contract does.
 struct Rival {
   std::string id;
-  double delta_bic = 0;
+  double behind = 0;  // evidence that its set lacks to the best
 };
 
 struct CauseLine {
   std::string id, name, signature;
-  double delta_bic = 0;  // how much worse the answer is without it
+  std::string easily_taken_for, experiment;  // what the table of causes says of it
+  double evidence = 0;                       // over the baseline, of all that are named together
   std::vector<ParameterLine> parameters;
-  std::vector<Rival> rivals;
+  std::vector<Rival> rivals;  // in its place in the other sets of a tie
 };
 
 struct Variant {
@@ -42,7 +44,7 @@ struct Variant {
 
 struct Rung {  // one candidate of the ladder
   std::string id, name;
-  double delta_bic;  // gain over the baseline
+  double evidence;  // over the baseline, alone
   bool chosen, tied;
 };
 
@@ -53,7 +55,7 @@ struct Interval {
 struct HeldOut {
   std::string how;
   Rmse before, after;
-  bool winding = false;                         // whose rms the intervals are of; else the housing's
+  bool winding = false;                         // the intervals are of the winding's rms; else of the housing's
   int blocks = 0;                               // of a minute
   std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few
   std::vector<Rmse> each_before;                // per log, when whole logs were held out
@@ -79,10 +81,14 @@ struct Gain {
   double burst_A = 0, speed_rad_per_s = 0, ambient_degC = 0;  // of that push; amperes as in the log
 };
 
-/// Needs the intervals to be there.
-std::string interval_words(const HeldOut& held_out);
+/// What text and page say alike.
+inline constexpr const char* gauge_words =
+    "all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be "
+    "seen";
+std::string cause_heading(const std::string& verdict);  // "Behaves like"
+std::string interval_words(const HeldOut& held_out);    // which has intervals
+std::string whiteness_words(const Whiteness& of_residual);
 
-/// The gain in words, for text and page.
 struct GainLine {
   std::string what, before, after;
 };
@@ -120,8 +126,7 @@ struct Report {
   std::string model_file;
   std::vector<std::string> reasoning;  // --explain
   std::vector<LogPlot> plots;
-  double fit_ms = 0;
-  int iterations = 0;
+  double fit_ms = 0;  // of the two-resistor model
 };
 
 std::string as_text(const Report& report, bool explain);

@@ -103,12 +103,20 @@ std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
   return s + "</tr>\n";
 }
 
+/// A sentence of the text report, which has neither capital nor full stop.
+std::string paragraph(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  return "<p>" + escaped(text) + ".</p>\n";
+}
+
 std::string k(double v) { return std::isnan(v) ? "–" : fmt::format("{:.2f}", v); }
 
 std::string parameter_rows(const std::vector<ParameterLine>& lines) {
   std::string s;
   for (const ParameterLine& p : lines) {
-    s += row({escaped(p.name), fmt::format("{:.4g} ± {:.2g}", p.value, p.std_error), escaped(p.unit),
+    s += row({escaped(p.name),
+              fmt::format("{:.4g}", p.value) + (p.at_bound ? "" : fmt::format(" ± {:.2g}", p.std_error)),
+              escaped(p.unit),
               p.at_bound     ? "at its bound"
               : p.determined ? "determined"
                              : "<em>not determined by this data</em>"});
@@ -116,37 +124,128 @@ std::string parameter_rows(const std::vector<ParameterLine>& lines) {
   return s;
 }
 
-std::string bars(const Report& r) {
-  double most = 10;
-  for (const Rung& rung : r.ladder) most = std::max(most, rung.delta_bic);
+std::string candidates(const Report& r) {
+  if (r.ladder.empty()) return "";
+  double most = 10;  // a ladder of nothing has short bars
+  for (const Rung& rung : r.ladder) most = std::max(most, rung.evidence);
   std::string s = fmt::format(
-      "<h2>Candidates</h2><p>Evidence gained over the two-resistor model; {:g} are asked for before anything is named, "
-      "and a lead of {:g} before one is named alone.</p><table class=ladder>\n",
+      "<h2>Candidates</h2><p>Evidence of each alone over the two-resistor model; {:g} are asked for before anything is "
+      "named, and a lead of {:g} before one is named alone.</p><table class=ladder>\n",
       Margins{}.detect, Margins{}.tie);
   for (const Rung& rung : r.ladder) {
     // Evidence spans decades: the bar is its square root.
-    const double width = 100 * std::sqrt(std::max(0.0, rung.delta_bic) / most);
+    const double width = 100 * std::sqrt(std::max(0.0, rung.evidence) / most);
     s += fmt::format(
         "<tr class='{}'><td>{}</td><td><div style='width:{:.1f}%'></div></td><td>{:.1f}</td><td>{}</td></tr>\n",
         rung.chosen ? "chosen"
         : rung.tied ? "tied"
                     : "",
-        escaped(rung.id), width, rung.delta_bic, escaped(rung.name));
+        escaped(rung.id), width, rung.evidence, escaped(rung.name));
   }
   return s + "</table>\n";
 }
 
+std::string named(const Report& r) {
+  std::string s;
+  for (const CauseLine& c : r.causes) {
+    s += fmt::format("<h2>{}: {}</h2><p>{}. Evidence{}: {:.1f}.</p><p>Shows as: {}.</p><table>",
+                     cause_heading(r.verdict), escaped(c.id), escaped(c.name),
+                     r.causes.size() > 1 ? " of all named" : "", c.evidence, escaped(c.signature)) +
+         parameter_rows(c.parameters) +
+         fmt::format("</table><p>Easily taken for: {}; told from them by: {}.</p>\n", escaped(c.easily_taken_for),
+                     escaped(c.experiment));
+  }
+  return s;
+}
+
+std::string errors(const Report& r) {
+  std::string s = "<h2>Errors</h2><table>" +
+                  row({"", "housing rms, K", "winding rms, K", "housing worst, K", "winding worst, K"}, "th");
+  const auto line = [&](const std::string& what, const Rmse& e) {
+    s += row({escaped(what), k(e.housing_K), k(e.core_K), k(e.housing_worst_K), k(e.core_worst_K)});
+  };
+  if (r.variants.empty()) line("two-resistor model, fitted", r.baseline_rmse);
+  for (const Variant& v : r.variants) line("two-resistor model, " + v.what, v.rmse);
+  if (!r.causes.empty()) line("extended model, fitted", r.extended_rmse);
+  if (r.held_out) {
+    for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i)
+      line("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
+    line("not seen (" + r.held_out->how + ")", r.held_out->before);
+    if (!r.causes.empty()) line("the same, extended model", r.held_out->after);
+  }
+  s += "</table>\n";
+  if (r.held_out && r.held_out->before_95) s += paragraph(interval_words(*r.held_out));
+  return s;
+}
+
+std::string worth(const Report& r) {
+  if (!r.gain) return "";
+  std::string s = "<h2>What it is worth</h2>" + paragraph(gain_conditions(*r.gain)) + "<table>" +
+                  row({"", "two resistors", "extended"}, "th");
+  for (const GainLine& line : gain_lines(*r.gain)) s += row({line.what, line.before, line.after});
+  return s + "</table>\n";
+}
+
+std::string where(const Report& r) {
+  std::string s = "<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
+  for (const Wrong& w : r.structure.wrong) {
+    s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") +
+                  fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),
+              w.channel,
+              fmt::format("{:.2f} K {}", std::abs(w.mean_K),
+                          w.mean_K > 0 ? "hotter than simulated" : "cooler than simulated"),
+              escaped(w.goes_with)});
+  }
+  s += "</table>\n" + paragraph(whiteness_words(r.structure.housing)) + "<table>" +
+       row({"residual correlates with", "correlation", "smoothed over"}, "th");
+  for (const Relation& c : r.structure.relations)
+    s += row({escaped(c.signal), fmt::format("{:+.2f}", c.correlation),
+              c.smoothed_s > 0 ? fmt::format("{:.0f} s", c.smoothed_s) : "–"});
+  return s + "</table>\n";
+}
+
+std::string two_resistors(const Report& r) {
+  std::string s = "<h2>Two-resistor model</h2><table>" + parameter_rows(r.baseline) + "</table>\n<ul>";
+  for (const std::string& check : r.checks) s += "<li>" + escaped(check) + "</li>";
+  for (const std::string& loose : r.loose) s += "<li class=warn>" + escaped(loose) + "</li>";
+  return s + "<li>" + gauge_words + "</li></ul>\n";
+}
+
+std::string advised(const Report& r) {
+  if (!r.experiment) return "";
+  std::string s = "<h2>Experiment that would tell</h2>" + paragraph(r.experiment->why) + "<table>" +
+                  row({"seconds", "current, A", "speed, rad/s"}, "th");
+  for (const ProfileStep& p : r.experiment->profile)
+    s += row({fmt::format("{:.0f}", p.seconds), fmt::format("{:.2f}", p.current_A),
+              fmt::format("{:.1f}", p.speed_rad_per_s)});
+  return s + "</table>\n";
+}
+
+std::string listed(const char* heading, const char* tag, const std::vector<std::string>& sentences) {
+  if (sentences.empty()) return "";
+  std::string s = fmt::format("<h2>{}</h2><{}>", heading, tag);
+  for (const std::string& sentence : sentences) s += "<li>" + escaped(sentence) + "</li>";
+  return s + fmt::format("</{}>\n", tag);
+}
+
 constexpr const char* style =
     "body{font:15px/1.45 Helvetica,Arial,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#222}"
-    "h1{font-size:1.35em;line-height:1.3}h2{font-size:1.1em;margin-top:1.8em;border-bottom:1px solid #ddd}"
+    "h1{font-size:1.35em;line-height:1.3}"
+    "h2{font-size:1.1em;margin-top:1.8em;border-bottom:1px solid #ddd}"
     ".verdict{display:inline-block;padding:.15em .7em;border-radius:1em;color:#fff;background:#666}"
-    ".adequate,.explained{background:#009e73}.partly_explained,.ambiguous{background:#c98a00}.unknown_cause,."
-    "insufficient{background:#b03020}"
-    "table{border-collapse:collapse}td,th{padding:.2em .8em .2em "
-    "0;text-align:left;vertical-align:top}th{color:#666;font-weight:normal}"
-    ".ladder td:nth-child(2){width:300px}.ladder div{background:#b8c8d8;height:.9em}.chosen "
-    "div{background:#009e73}.tied div{background:#e69f00}"
-    ".chosen td:first-child{font-weight:bold}svg{max-width:100%;height:auto}.warn{color:#a03010}";
+    ".adequate,.explained{background:#009e73}"
+    ".partly_explained,.ambiguous{background:#c98a00}"
+    ".unknown_cause,.insufficient{background:#b03020}"
+    "table{border-collapse:collapse}"
+    "td,th{padding:.2em .8em .2em 0;text-align:left;vertical-align:top}"
+    "th{color:#666;font-weight:normal}"
+    ".ladder td:nth-child(2){width:300px}"
+    ".ladder div{background:#b8c8d8;height:.9em}"
+    ".chosen div{background:#009e73}"
+    ".tied div{background:#e69f00}"
+    ".chosen td:first-child{font-weight:bold}"
+    "svg{max-width:100%;height:auto}"
+    ".warn{color:#a03010}";
 
 }  // namespace
 
@@ -157,77 +256,8 @@ std::string as_html(const Report& r) {
                    r.verdict, r.verdict, escaped(r.motor));
   if (!r.core_refusal.empty()) s += "<p class=warn>" + escaped(r.core_refusal) + "</p>\n";
   for (std::size_t l = 0; l < r.plots.size(); ++l) s += inlined(picture(r, l), l) + "\n";
-
-  if (!r.ladder.empty()) s += bars(r);
-  for (const CauseLine& c : r.causes) {
-    s += fmt::format("<h2>{}: {}</h2><p>{}. Evidence {:.1f}.</p><table>",
-                     r.verdict == "ambiguous" ? "May behave like" : "Behaves like", escaped(c.id), escaped(c.name),
-                     c.delta_bic) +
-         parameter_rows(c.parameters) + "</table>\n";
-  }
-  s += "<h2>Errors</h2><table>" +
-       row({"", "housing rms, K", "winding rms, K", "housing worst, K", "winding worst, K"}, "th");
-  const auto errors = [&](const std::string& what, const Rmse& e) {
-    s += row({escaped(what), k(e.housing_K), k(e.core_K), k(e.housing_worst_K), k(e.core_worst_K)});
-  };
-  if (r.variants.empty()) errors("two-resistor model, fitted", r.baseline_rmse);
-  for (const Variant& v : r.variants) errors("two-resistor model, " + v.what, v.rmse);
-  if (!r.causes.empty()) errors("extended model, fitted", r.extended_rmse);
-  if (r.held_out) {
-    for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i)
-      errors("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
-    errors("not seen (" + r.held_out->how + ")", r.held_out->before);
-    if (!r.causes.empty()) errors("the same, extended model", r.held_out->after);
-  }
-  s += "</table>\n";
-  if (r.held_out && r.held_out->before_95) s += "<p>" + escaped(interval_words(*r.held_out)) + "</p>\n";
-  if (r.gain) {
-    s += "<h2>What it is worth</h2><p>" + escaped(gain_conditions(*r.gain)) + "</p><table>" +
-         row({"", "two resistors", "extended"}, "th");
-    for (const GainLine& line : gain_lines(*r.gain)) s += row({line.what, line.before, line.after});
-    s += "</table>\n";
-  }
-  s += "<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
-  for (const Wrong& w : r.structure.wrong) {
-    s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") +
-                  fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),
-              w.channel,
-              fmt::format("{:.2f} K {}", std::abs(w.mean_K),
-                          w.mean_K > 0 ? "hotter than simulated" : "cooler than simulated"),
-              escaped(w.goes_with)});
-  }
-  s += "</table>\n" + fmt::format(
-                          "<p>The residual is {:.2f} times the noise; chance of so unwhite a residual from a right "
-                          "model: {:.2g} (cumulated periodogram), {:.2g} "
-                          "(Ljung-Box).</p>\n<table>",
-                          r.structure.housing.ratio, r.structure.housing.white_p, r.structure.housing.ljung_box_p);
-  s += row({"residual goes with", "correlation", "smoothed over"}, "th");
-  for (const Relation& c : r.structure.relations)
-    s += row({escaped(c.signal), fmt::format("{:+.2f}", c.correlation),
-              c.smoothed_s > 0 ? fmt::format("{:.0f} s", c.smoothed_s) : "–"});
-  s += "</table>\n<h2>Two-resistor model</h2><table>" + parameter_rows(r.baseline) + "</table>\n<ul>";
-  for (const std::string& check : r.checks) s += "<li>" + escaped(check) + "</li>";
-  for (const std::string& loose : r.loose) s += "<li class=warn>" + escaped(loose) + "</li>";
-  s += "<li>all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain "
-       "cannot be seen</li></ul>\n";
-  if (r.experiment) {
-    s += "<h2>Experiment that would tell</h2><p>" + escaped(r.experiment->why) + "</p><table>" +
-         row({"seconds", "current, A", "speed, rad/s"}, "th");
-    for (const ProfileStep& p : r.experiment->profile)
-      s += row({fmt::format("{:.0f}", p.seconds), fmt::format("{:.2f}", p.current_A),
-                fmt::format("{:.1f}", p.speed_rad_per_s)});
-    s += "</table>\n";
-  }
-  if (!r.reasoning.empty()) {
-    s += "<h2>How this was found</h2><ol>";
-    for (const std::string& step : r.reasoning) s += "<li>" + escaped(step) + "</li>";
-    s += "</ol>\n";
-  }
-  if (!r.notes.empty()) {
-    s += "<h2>On the data</h2><ul>";
-    for (const std::string& note : r.notes) s += "<li>" + escaped(note) + "</li>";
-    s += "</ul>\n";
-  }
+  s += candidates(r) + named(r) + errors(r) + worth(r) + where(r) + two_resistors(r) + advised(r);
+  s += listed("How this was found", "ol", r.reasoning) + listed("On the data", "ul", r.notes);
   return s + "</body></html>\n";
 }
 

@@ -71,10 +71,10 @@ std::string as_json(const Report& r) {
   out["causes"] = ordered_json::array();
   for (const CauseLine& c : r.causes) {
     ordered_json rivals = ordered_json::array();
-    for (const Rival& rival : c.rivals) rivals.push_back({{"id", rival.id}, {"delta_bic", number(rival.delta_bic)}});
+    for (const Rival& rival : c.rivals) rivals.push_back({{"id", rival.id}, {"delta_bic", number(rival.behind)}});
     out["causes"].push_back({{"id", c.id},
                              {"name", c.name},
-                             {"delta_bic", number(c.delta_bic)},
+                             {"delta_bic", number(c.evidence)},
                              {"parameters", parameters(c.parameters)},
                              {"rivals", rivals}});
   }
@@ -83,7 +83,7 @@ std::string as_json(const Report& r) {
   out["candidates"] = ordered_json::array();
   for (const Rung& rung : r.ladder) {
     out["candidates"].push_back(
-        {{"id", rung.id}, {"gain_bic", number(rung.delta_bic)}, {"chosen", rung.chosen}, {"tied", rung.tied}});
+        {{"id", rung.id}, {"gain_bic", number(rung.evidence)}, {"chosen", rung.chosen}, {"tied", rung.tied}});
   }
   out["held_out"] = nullptr;
   if (r.held_out) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which causes does the data ask for? Fits every cause alone, then with a second and a third, and decides, or abstains.
+// Which causes does the data ask for? Fits every cause alone, then every pair worth it, and decides, or abstains.
 //
 // A wrong name is worse than no name. The decision therefore knows five ends: nothing is missing; one set of causes
 // stands clear; several sets are as good (a tie); something is missing and no known cause explains it; too poor to say.

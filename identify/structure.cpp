@@ -4,39 +4,36 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 namespace identify {
 namespace {
 
-using thermal::Drive;
+using thermal::Boundary, thermal::Drive;
 
 struct Signal {
   const char* name;
   std::function<double(const Bin&)> of;
 };
 
-double d(const Bin& b, Drive drive) { return b.input[drive]; }
-
 std::vector<Signal> signals(const Problem& problem) {
   std::vector<Signal> s;
   if (problem.heated_by_power())
-    s.push_back({"power", [](const Bin& b) { return d(b, Drive::power_W); }});
+    s.push_back({"power", [](const Bin& b) { return b.input[Drive::power_W]; }});
   else {
-    s.push_back({"current squared", [](const Bin& b) { return d(b, Drive::current_A2); }});
-    s.push_back({"size of the current", [](const Bin& b) { return d(b, Drive::current_A); }});
+    s.push_back({"current squared", [](const Bin& b) { return b.input[Drive::current_A2]; }});
+    s.push_back({"size of the current", [](const Bin& b) { return b.input[Drive::current_A]; }});
     s.push_back({"sign of the current", [](const Bin& b) { return b.signed_A; }});
   }
   if (problem.speed08_mean > 0) {
-    s.push_back({"speed", [](const Bin& b) { return d(b, Drive::speed_rad_per_s); }});
-    s.push_back({"speed squared", [](const Bin& b) { return d(b, Drive::speed2_rad2_per_s2); }});
+    s.push_back({"speed", [](const Bin& b) { return b.input[Drive::speed_rad_per_s]; }});
+    s.push_back({"speed squared", [](const Bin& b) { return b.input[Drive::speed2_rad2_per_s2]; }});
   }
-  s.push_back({"sink temperature", [](const Bin& b) { return b.input.boundary_degC[0]; }});
+  s.push_back({"sink temperature", [](const Bin& b) { return b.input[Boundary::ambient]; }});
   if (problem.logs.front().has_neighbour)
-    s.push_back({"neighbour's temperature",
-                 [](const Bin& b) { return b.input.boundary_degC[static_cast<int>(thermal::Boundary::neighbour)]; }});
+    s.push_back({"neighbour's temperature", [](const Bin& b) { return b.input[Boundary::neighbour]; }});
   if (problem.logs.front().has_frame)
-    s.push_back({"frame temperature",
-                 [](const Bin& b) { return b.input.boundary_degC[static_cast<int>(thermal::Boundary::frame)]; }});
+    s.push_back({"frame temperature", [](const Bin& b) { return b.input[Boundary::frame]; }});
   return s;
 }
 
@@ -70,6 +67,29 @@ double kolmogorov_tail(double x) {
   return std::clamp(p, 0.0, 1.0);
 }
 
+/// What is unusual from bin `from` to `to`: the signal whose mean lies furthest from its mean in the rest of the log.
+std::string unusual_in(const Bins& log, std::size_t from, std::size_t to, const std::vector<Signal>& all) {
+  const auto n = log.bins.size();
+  const auto bins = static_cast<double>(n), inside = static_cast<double>(to - from), outside = bins - inside;
+  std::string out;
+  double most = 0.3;  // standard deviations; less is no more than any stretch shows
+  for (const Signal& s : all) {
+    double sum_inside = 0, sum_outside = 0, square = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double v = s.of(log.bins[k]);
+      (k >= from && k < to ? sum_inside : sum_outside) += v;
+      square += v * v;
+    }
+    if (outside < 1 || inside < 1) continue;
+    const double sd = std::sqrt(std::max(1e-12, square / bins - std::pow((sum_inside + sum_outside) / bins, 2)));
+    const double z = (sum_inside / inside - sum_outside / outside) / sd;
+    if (std::abs(z) > most) most = std::abs(z), out = std::string(z > 0 ? "high " : "low ") + s.name;
+  }
+  if (!out.empty()) return out;
+  return from < n / 10 ? "the start" : to > n * 9 / 10 ? "the end" : "none of the signals";
+}
+
+/// Appends the stretches of log `l` where the residual's running mean stays beyond `noise_K` on one side.
 void find_wrong(const Problem& problem, int l, const char* channel, const std::vector<double>& residual, double noise_K,
                 const std::vector<Signal>& all, std::vector<Wrong>& out) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
@@ -90,30 +110,9 @@ void find_wrong(const Problem& problem, int l, const char* channel, const std::v
     const double m = i < n ? mean(i > half ? i - half : 0, std::min(n, i + half)) : 0;
     const int now = m > noise_K ? 1 : m < -noise_K ? -1 : 0;
     if (now == sign) continue;
-    if (sign != 0) {
-      Wrong w{
-          l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s, mean(start, i),
-          ""};
-      // What is unusual in this stretch: the signal whose mean lies furthest from its mean in the rest of the log.
-      double most = 0.3;
-      for (const Signal& s : all) {
-        double in = 0, out_ = 0, square = 0;
-        for (std::size_t k = 0; k < n; ++k) {
-          const double v = s.of(log.bins[k]);
-          (k >= start && k < i ? in : out_) += v;
-          square += v * v;
-        }
-        const double inside = static_cast<double>(i - start), outside = static_cast<double>(n) - inside,
-                     N = static_cast<double>(n);
-        if (outside < 1 || inside < 1) continue;
-        const double sd = std::sqrt(std::max(1e-12, square / N - std::pow((in + out_) / N, 2)));
-        const double z = (in / inside - out_ / outside) / sd;
-        if (std::abs(z) > most) most = std::abs(z), w.goes_with = std::string(z > 0 ? "high " : "low ") + s.name;
-      }
-      if (w.goes_with.empty())
-        w.goes_with = start < n / 10 ? "the start" : i > n * 9 / 10 ? "the end" : "none of the signals";
-      out.push_back(w);
-    }
+    if (sign != 0)
+      out.push_back({l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s,
+                     mean(start, i), unusual_in(log, start, i, all)});
     sign = now;
     start = i;
   }
@@ -151,8 +150,7 @@ Whiteness whiteness(const std::vector<double>& whitened) {
   for (std::size_t i = 0; i < m * group; ++i) g[i / group] += v[i] - mean;
   double total = 0;
   for (std::size_t f = 1; f <= half; ++f) {
-    const double w = 2 * 3.14159265358979323846 * static_cast<double>(f) / static_cast<double>(m),
-                 turn = 2 * std::cos(w);
+    const double w = 2 * std::numbers::pi * static_cast<double>(f) / static_cast<double>(m), turn = 2 * std::cos(w);
     double s1 = 0, s2 = 0;
     for (const double x : g) {
       const double s = x + turn * s1 - s2;

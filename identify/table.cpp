@@ -8,7 +8,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <string_view>
 
 #include "wire/pc/user_error.hpp"
@@ -21,7 +20,6 @@ using wire::pc::UserError;
 
 // A logger's row is below a kilobyte; a line of this size is a file without line ends, or not a table at all.
 constexpr std::size_t longest_line = 1 << 20;
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 std::string_view trimmed(std::string_view s) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -33,7 +31,9 @@ std::string_view trimmed(std::string_view s) {
 std::string whole_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    throw UserError(Exit::usage, path + ": there is no such file; check the path.");
+    throw UserError(Exit::usage, path + (std::filesystem::exists(path, error)
+                                             ? ": this is a folder or a device and no log; name a CSV file."
+                                             : ": there is no such file; check the path."));
   }
   std::ifstream in(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(std::filesystem::file_size(path)), '\0');

@@ -5,13 +5,16 @@
 //        when the separator is a semicolon
 //   out  names and columns of numbers, NaN where a cell is empty or says nan
 //
-// Does not know what the columns mean (roles.hpp does).
+// Does not know what the columns mean (log.hpp does).
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
 namespace identify {
+
+inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 struct Table {
   std::string file;
@@ -23,7 +26,7 @@ struct Table {
   int find(const std::string& name) const;  // -1: no such column
 };
 
-/// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when there is no such file.
+/// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when it is no readable file.
 Table read_table(const std::string& path);
 
 }  // namespace identify

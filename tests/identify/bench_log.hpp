@@ -13,9 +13,9 @@
 
 namespace tests {
 
+/// EC 16 surrogate: 3/2 of a phase's resistance, 1/K, K/W, J/K.
 struct BenchMotor {
-  double ohm = 1.5 * 0.5, copper = 0.00393, R1 = 1.08, R2 = 16.3, C1 = 1.13,
-         C2 = 18.0;  // EC 16 surrogate, 3/2 of a phase
+  double ohm = 1.5 * 0.5, copper = 0.00393, R1 = 1.08, R2 = 16.3, C1 = 1.13, C2 = 18.0;
 };
 
 struct BenchOptions {

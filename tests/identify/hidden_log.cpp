@@ -17,7 +17,7 @@ namespace {
 
 using host_sim::HiddenEffects;
 
-/// The table of thermal.md's motors: K/W, K/W, s, s.
+/// Motors of catalogues and robots: K/W, K/W, s, s. Where C1 and C2 come from: the time constants over R1 and R2.
 struct MotorRow {
   const char* name;
   double R1, R2, tau_w, tau_m;

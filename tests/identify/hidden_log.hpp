@@ -25,12 +25,10 @@ struct HiddenLogOptions {
   Duty duty = Duty::robot;
   Core core = Core::sparse;
   std::uint64_t seed = 1;
-  std::vector<std::string>
-      effects;  // cause ids; "latent", "gusts", "contact", "grease", "thermostat", "curing", "overload" are outside
-  double strength = 1;        // of the size drawn
-  bool mostly_small = false;  // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
-  double structure =
-      0.1;  // teeth, yoke, frame as share of host-sim's defaults: how far the clean motor is from two nodes
+  std::vector<std::string> effects;  // ids of hideable() and outside()
+  double strength = 1;               // of the size drawn
+  bool mostly_small = false;         // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
+  double structure = 0.1;  // how far the clean motor is from two nodes: teeth, yoke, frame, 1 as host-sim has them
   double seconds = 1200;
   bool small_ones = false;  // eleven small effects besides
   bool noisy = true;        // false: the same log as the sensors would read it without noise and steps

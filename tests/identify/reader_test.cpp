@@ -170,6 +170,15 @@ TEST(Reader, AnInputThatIsMostlyMissingIsRefused) {
   says(complaint(head + "0,1,20\n1,,20\n2,,20\n3,1,20\n"), "current_A is missing in 50 % of the rows");
 }
 TEST(Reader, AColumnOfNothingCountsAsMissing) { says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature"); }
+TEST(Reader, RowsOutsideOfEverySessionAreSaid) {
+  const auto logs = read("session,time_s,current_A,housing_degC\n1,0,1,20\n,1,1,20\n1,2,1,21\n");
+  ASSERT_EQ(logs.size(), 1u);
+  says(logs[0].notes.back(), "1 rows without a session were left out");
+}
+TEST(Reader, AResistanceThatNothingIsMadeOfIsSaid) {
+  const Log log = read("time_s,current_A,housing_degC,winding_ohm\n0,1,20,0.5\n1,1,21,0.5\n")[0];
+  says(log.notes.front(), "winding_ohm is not used");
+}
 TEST(Reader, AFileThatIsNotThereIsAUsageError) {
   try {
     identify::read_table("no/such/log.csv");

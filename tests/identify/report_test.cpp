@@ -169,6 +169,18 @@ TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
   EXPECT_EQ(&identify::most_cautious(problem, {&heavy, &found}), &found);
 }
 
+TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
+  tests::BenchOptions options;
+  options.seconds = 120;
+  auto logs = bench_logs({options, options});
+  logs[1].name = "the other";
+  logs[1].of(identify::Role::speed).clear();
+  const auto notes = identify::discover(logs, std::nullopt).notes;
+  EXPECT_EQ(std::count(notes.begin(), notes.end(),
+                       "the other: speed_rad_per_s is missing, which another log has; the rotor is taken to stand."),
+            1);
+}
+
 TEST(Report, WhatIsAdequateHasNothingToGain) {
   tests::BenchOptions options;
   options.core_every_s = 20;

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include "identify/experiment.hpp"
 #include "identify/model_file.hpp"
@@ -193,6 +194,14 @@ TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
         "sensor_gain",        "ambient_drift",        "clock_delay",    "stall_imbalance", "windage",
         "power_share"}) {
     EXPECT_GE(identify::cause_named(id), 0) << id;
+  }
+}
+
+TEST(Causes, WhatOneIsEasilyTakenForStandsInTheTable) {
+  for (const identify::Cause& cause : identify::causes()) {
+    std::istringstream rivals(cause.rivals);
+    for (std::string id; std::getline(rivals >> std::ws, id, ',');)
+      EXPECT_GE(identify::cause_named(id), 0) << cause.id << ": " << id;
   }
 }
 
