@@ -12,9 +12,9 @@
 namespace identify {
 namespace {
 
-// Two causes at most: three at once imitate nearly anything (of seven forms that the table does not know, five were
-// "explained" by some three of it); two do not.
-//
+// Sets hold two causes at most: three at once imitate nearly anything (of seven forms that the table does not know,
+// five were "explained" by some three of it); two do not.
+
 // Every pair is looked at with a few Newton steps, and those that may come near the best are fitted to the end: a look
 // errs by about so much evidence, or by this share of what the pair gains.
 constexpr int look_steps = 2;
@@ -355,6 +355,141 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
   sort(sets);
 }
 
+/// Every cause alone, twice: the best of the first round shows how noisy the readings are, and with that all are fitted
+/// again.
+void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all, Field& field) {
+  fit_alone(problem, all, field);
+  if (field.singles.empty()) return;
+  const Fit& best = field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
+  const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
+  refine_housing_noise(problem, best);
+  if (sparse_core) refine_core_noise(problem, best);
+  fit_alone(problem, all, field);
+}
+
+/// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
+bool ends_without_a_name(const Problem& problem, const Field& field, const Disturbance& without_causes,
+                         const Margins& margins, Search& out) {
+  const double gain = field.singles.empty() ? 0 : field.singles.front().gain;
+  const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
+  const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
+  const bool disturbed =
+      without_causes.gain > margins.remains && without_causes.noise.disturbance_K > margins.noticeable_K;
+  if (gain > margins.detect && (moves >= margins.noticeable_K || disturbed)) return false;
+  out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
+  out.steps.push_back(
+      gain > margins.detect
+          ? fmt::format(
+                "{} gains {:.1f} in evidence, but moves no temperature by more than {:.2f} K rms: not worth a name.",
+                first, gain, moves)
+          : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
+                        margins.detect, first, gain));
+  if (disturbed)
+    out.steps.push_back(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.",
+                                    without_causes.noise.disturbance_K, without_causes.gain));
+  return true;
+}
+
+/// Where even the best leaves a disturbance, all are judged again with that counted as noise: a model that is known to
+/// be off cannot rank causes by what is smaller than its error.
+Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>& all, const Margins& margins,
+                               Field& field, Search& out) {
+  fit_pairs(problem, field);
+  const auto& leader = field.pairs.empty() || field.pairs.front().gain < field.singles.front().gain + margins.second
+                           ? field.singles.front()
+                           : field.pairs.front();
+  const Disturbance left = disturbance_of(problem, leader.fit);
+  Problem judged = problem;
+  if (left.gain > margins.remains) {
+    judged.noise = left.noise;
+    out.steps.push_back(
+        fmt::format("Even the best set, {}, leaves a slow disturbance of {:.2f} K, which from here on counts as noise.",
+                    listed(leader.fit.chosen), judged.noise.disturbance_K));
+    fit_alone(judged, all, field);
+    fit_pairs(judged, field);
+  }
+  return judged;
+}
+
+/// One cause or two?
+void choose(const Problem& judged, const Margins& margins, Field field, Search& out) {
+  const std::string refusal = why_no_pair(judged, field, margins);
+  if (refusal.empty()) {
+    const Candidate &pair = field.pairs.front(), &single = field.singles.front();
+    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.gain,
+                                    pair.gain - single.gain, listed(single.fit.chosen)));
+    out.sets = std::move(field.pairs);
+    if (judged.noise.disturbance_K > 0) add_neighbours(judged, field, out.sets);
+  } else {
+    out.steps.push_back(refusal);
+    out.sets = std::move(field.singles);
+  }
+  out.sets.front().chosen = true;
+  out.chosen = out.sets.front();
+}
+
+/// What the set that was chosen leaves.
+struct Left {
+  double before_K, after_K;  // missed by the baseline; of a disturbance beside the set
+  double gain;               // of that disturbance
+  double explains;           // gain of the set with it over a disturbance alone
+  bool complete;             // no more than noise is left
+  bool mostly;               // little is left beside what was explained
+  bool nearly;               // what is left may be the sensors' own, since no rest has shown how they wander
+
+  std::string words() const {
+    return fmt::format(
+        "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
+        "gains {:.1f}",
+        before_K, after_K, gain, explains);
+  }
+};
+
+Left left_by_chosen(const Problem& problem, const Search& found, const Disturbance& without_causes,
+                    const Margins& margins) {
+  const std::vector<Chosen>& chosen = found.chosen.fit.chosen;
+  const Disturbance left = disturbance_of(problem, fit(problem, chosen, {&found.chosen.fit}));
+  const Rmse missed = rmse_of(problem, found.base.fit);
+  Left out{};
+  out.before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
+  out.after_K = left.noise.disturbance_K;
+  out.gain = left.gain;
+  out.explains = left.evidence - without_causes.evidence;
+  out.complete = left.gain < margins.remains;
+  out.mostly = (chosen.size() == 1 && out.explains > margins.dominance * left.gain) ||
+               out.after_K < margins.small_part * out.before_K;
+  out.nearly = problem.noise.idle_s == 0 && out.after_K < margins.small_part_unseen * out.before_K;
+  return out;
+}
+
+/// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
+/// from the best by no more than what is left.
+void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
+  out.tied.push_back(ids_of(out.chosen.fit.chosen));
+  for (Candidate& c : out.sets) {
+    const double behind = out.chosen.gain - c.gain;
+    if (c.chosen || behind >= reach) continue;
+    const auto ids = ids_of(c.fit.chosen);
+    if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
+    if (behind >= margins.tie && out.tied.size() > 1 &&
+        moved_K(problem, out.chosen.fit, c.fit) > margins.left_apart * left.after_K)
+      continue;
+    c.tied = true;
+    out.tied.push_back(ids);
+  }
+}
+
+/// A board runs the model alone: what is handed on is fitted without leeway, to the noise that was judged by.
+void refit_without_leeway(Problem judged, Search& out) {
+  judged.lateness_K.clear();
+  const auto refit = [&](Fit& f) { f = fit(judged, f.chosen, {&f}); };
+  refit(out.base.fit);
+  refit(out.chosen.fit);
+  for (Candidate& c : out.sets) {
+    if (c.tied) refit(c.fit);
+  }
+}
+
 }  // namespace
 
 const char* word(Verdict v) {
@@ -387,134 +522,46 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Search out;
   Field field;
   const auto all = available(problem, without);
-  const auto say = [&](std::string step) { out.steps.push_back(std::move(step)); };
   problem.lateness_K = ordinary_lateness_K(problem, fit(problem, {}));
-  // A board runs the model alone: what is handed on was fitted without leeway, to the noise that was judged by.
-  const auto hand_on = [&](Problem exact) {
-    exact.lateness_K.clear();
-    const auto refit = [&](Fit& f) { f = fit(exact, f.chosen, {&f}); };
-    refit(out.base.fit);
-    refit(out.chosen.fit);
-    for (Candidate& c : out.sets) {
-      if (c.tied) refit(c.fit);
-    }
-  };
-  fit_alone(problem, all, field);
-  if (!field.singles.empty()) {
-    const Fit& best = field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
-    const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
-    refine_housing_noise(problem, best);
-    if (sparse_core) refine_core_noise(problem, best);
-    fit_alone(problem, all, field);
-  }
+  fit_alone_and_settle_noise(problem, all, field);
   out.base = out.chosen = field.base;
   out.noise = problem.noise;
   out.singles = field.singles;
-  say(fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
-
-  // Is anything missing?
+  out.steps.push_back(
+      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
   const Disturbance without_causes = disturbance_of(problem, out.base.fit);
-  const double gain = field.singles.empty() ? 0 : field.singles.front().gain;
-  const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
-  const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
-  const bool disturbed =
-      without_causes.gain > margins.remains && without_causes.noise.disturbance_K > margins.noticeable_K;
-  if (gain <= margins.detect || (moves < margins.noticeable_K && !disturbed)) {
-    out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
-    say(gain > margins.detect
-            ? fmt::format(
-                  "{} gains {:.1f} in evidence, but moves no temperature by more than {:.2f} K rms: not worth a "
-                  "name.",
-                  first, gain, moves)
-            : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
-                          margins.detect, first, gain));
-    if (disturbed)
-      say(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.", without_causes.noise.disturbance_K,
-                      without_causes.gain));
-    hand_on(problem);
+  if (ends_without_a_name(problem, field, without_causes, margins, out)) {
+    refit_without_leeway(problem, out);
     return out;
   }
 
-  // Where even the best leaves a disturbance, all are judged again with that counted as noise: a model that is known to
-  // be off cannot rank causes by what is smaller than its error.
-  fit_pairs(problem, field);
-  const auto& leader = field.pairs.empty() || field.pairs.front().gain < field.singles.front().gain + margins.second
-                           ? field.singles.front()
-                           : field.pairs.front();
-  const Disturbance left_by_leader = disturbance_of(problem, leader.fit);
-  Problem judged = problem;
-  if (left_by_leader.gain > margins.remains) {
-    judged.noise = left_by_leader.noise;
-    say(fmt::format("Even the best set, {}, leaves a slow disturbance of {:.2f} K, which from here on counts as noise.",
-                    listed(leader.fit.chosen), judged.noise.disturbance_K));
-    fit_alone(judged, all, field);
-    fit_pairs(judged, field);
-  }
+  const Problem judged = judged_by_what_remains(problem, all, margins, field, out);
+  choose(judged, margins, std::move(field), out);
+  const Left left = left_by_chosen(problem, out, without_causes, margins);
+  const double reach = left.complete ? margins.tie : margins.tie + left.gain;
+  mark_ties(problem, left, reach, margins, out);
 
-  // One cause or two?
-  const std::string refusal = why_no_pair(judged, field, margins);
-  if (refusal.empty()) {
-    say(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(field.pairs.front().fit.chosen),
-                    field.pairs.front().gain, field.pairs.front().gain - field.singles.front().gain,
-                    listed(field.singles.front().fit.chosen)));
-    out.sets = std::move(field.pairs);
-    if (judged.noise.disturbance_K > 0) add_neighbours(judged, field, out.sets);
-  } else {
-    say(refusal);
-    out.sets = std::move(field.singles);
-  }
-  out.sets.front().chosen = true;
-  out.chosen = out.sets.front();
-  const bool single = out.chosen.fit.chosen.size() == 1;
-  const std::string best = listed(out.chosen.fit.chosen);
-
-  // What does the best leave, and does it explain more than a disturbance without a name would?
-  const Disturbance left = disturbance_of(problem, fit(problem, out.chosen.fit.chosen, {&out.chosen.fit}));
-  const double explains = left.evidence - without_causes.evidence;
-  const bool complete = left.gain < margins.remains;
-  const Rmse missed = rmse_of(problem, out.base.fit);
-  const double before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
-  const double after_K = left.noise.disturbance_K;
-  const bool mostly = (single && explains > margins.dominance * left.gain) || after_K < margins.small_part * before_K;
-  // What is left may be the sensors' own where no rest at all has shown how they wander.
-  const bool nearly = problem.noise.idle_s == 0 && after_K < margins.small_part_unseen * before_K;
-  const std::string remains = fmt::format(
-      "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
-      "gains {:.1f}",
-      before_K, after_K, left.gain, explains);
-  // Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
-  // from the best by no more than what is left.
-  const double reach = complete ? margins.tie : margins.tie + left.gain;
-  out.tied.push_back(ids_of(out.chosen.fit.chosen));
-  for (Candidate& c : out.sets) {
-    const double behind = out.chosen.gain - c.gain;
-    if (c.chosen || behind >= reach) continue;
-    const auto ids = ids_of(c.fit.chosen);
-    if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
-    if (behind >= margins.tie && out.tied.size() > 1 &&
-        moved_K(problem, out.chosen.fit, c.fit) > margins.left_apart * after_K)
-      continue;
-    c.tied = true;
-    out.tied.push_back(ids);
-  }
   std::string ladder;
   for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)
     ladder += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
-  say("The best sets and their evidence: " + ladder + ".");
+  out.steps.push_back("The best sets and their evidence: " + ladder + ".");
 
   const bool tie = out.tied.size() > 1;
-  if (explains < margins.detect || (!complete && !mostly && !(nearly && tie))) {
+  if (left.explains < margins.detect || (!left.complete && !left.mostly && !(left.nearly && tie))) {
     out.verdict = Verdict::unknown_cause;
-    say(fmt::format("The best is {}, but {}: none of the known causes explains this.", best, remains));
+    out.steps.push_back(fmt::format("The best is {}, but {}: none of the known causes explains this.",
+                                    listed(out.chosen.fit.chosen), left.words()));
   } else {
-    out.verdict = tie ? Verdict::ambiguous : complete ? Verdict::explained : Verdict::partly_explained;
-    out.remains_K = complete ? 0 : after_K;
-    say(tie ? fmt::format("Others come within {:.0f}, {} of them near: they cannot be told apart with this data; {}.",
-                          reach, out.tied.size() - 1, remains)
-            : fmt::format("No other set comes within {:.0f}; {}.", reach, remains));
-    if (!complete && !mostly) say("No rest shows how the sensors wander of themselves: what is left may be theirs.");
+    out.verdict = tie ? Verdict::ambiguous : left.complete ? Verdict::explained : Verdict::partly_explained;
+    out.remains_K = left.complete ? 0 : left.after_K;
+    out.steps.push_back(
+        tie ? fmt::format("Others come within {:.0f}, {} of them near: they cannot be told apart with this data; {}.",
+                          reach, out.tied.size() - 1, left.words())
+            : fmt::format("No other set comes within {:.0f}; {}.", reach, left.words()));
+    if (!left.complete && !left.mostly)
+      out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }
-  hand_on(judged);
+  refit_without_leeway(judged, out);
   return out;
 }
 
