@@ -90,6 +90,8 @@ struct Chosen {
   bool operator==(const Chosen&) const = default;
 };
 
+inline const Cause& cause_of(const Chosen& chosen) { return causes()[static_cast<std::size_t>(chosen.cause)]; }
+
 /// Edits `model` by `cause` with parameters `k` in physical units. `log`: which log the model replays.
 template <class S>
 void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<S>& model) {

@@ -39,8 +39,7 @@ std::vector<Rung> ladder_of(const Search& found) {
     const bool chosen = named_clearly(found.verdict) && !found.tied.empty() && holds(found.tied.front(), id);
     const bool tied =
         std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
-    out.push_back(
-        {id, causes()[static_cast<std::size_t>(c.fit.chosen.front().cause)].name, c.gain, chosen, tied && !chosen});
+    out.push_back({id, cause_of(c.fit.chosen.front()).name, c.gain, chosen, tied && !chosen});
   }
   return out;
 }
@@ -67,7 +66,7 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   if (!named_clearly(found.verdict) && found.verdict != Verdict::ambiguous) return;
   const Fit& f = found.chosen.fit;
   for (std::size_t i = 0; i < f.chosen.size(); ++i) {
-    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[i].cause)];
+    const Cause& cause = cause_of(f.chosen[i]);
     CauseLine line;
     line.id = cause.id;
     line.name = cause.name;
@@ -180,7 +179,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   const Fit& best = found.singles.front().fit;
   Eigen::Index at = base_count;
   for (const Chosen& c : best.chosen) {
-    const Cause& cause = causes()[static_cast<std::size_t>(c.cause)];
+    const Cause& cause = cause_of(c);
     if (cause.edit == Edit::delay && best.at_bound[static_cast<std::size_t>(at)]) {
       return fmt::format(
           "Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
@@ -237,7 +236,7 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
   const Eigen::VectorXd sd = f.std_errors();
   Eigen::Index at = base_count;
   for (std::size_t c = 0; c < f.chosen.size(); ++c) {
-    const Cause& cause = causes()[static_cast<std::size_t>(f.chosen[c].cause)];
+    const Cause& cause = cause_of(f.chosen[c]);
     for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
       if (c != which) continue;
       const Parameter& parameter = cause.parameters[p];

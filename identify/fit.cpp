@@ -29,7 +29,7 @@ double first_reading(const Bins& log, double Bin::*reading, int most = 5) {
 
 int coordinates_of(const std::vector<Chosen>& chosen) {
   int n = 0;
-  for (const Chosen& c : chosen) n += static_cast<int>(causes()[static_cast<std::size_t>(c.cause)].parameters.size());
+  for (const Chosen& c : chosen) n += static_cast<int>(cause_of(c).parameters.size());
   return n;
 }
 
@@ -41,7 +41,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
     out.push_back({x, x, b.log_sd, x - b.log_room, x + b.log_room});
   }
   for (const Chosen& c : chosen) {
-    for (const Parameter& p : causes()[static_cast<std::size_t>(c.cause)].parameters) {
+    for (const Parameter& p : cause_of(c).parameters) {
       if (p.logarithmic) {
         const double centre = std::log(p.none != 0 ? p.none : p.typical);
         out.push_back({centre, centre, p.typical, std::log(p.low), std::log(p.high)});
@@ -83,7 +83,7 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   set.housing = {1, S(0), S(0), S(0)};
   int at = base_count;
   for (const Chosen& c : chosen) {
-    const Cause& cause = causes()[static_cast<std::size_t>(c.cause)];
+    const Cause& cause = cause_of(c);
     S k[4];
     for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
       const Parameter& parameter = cause.parameters[p];
@@ -378,6 +378,28 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
   return out;
 }
 
+/// Where a cause starts whose parameters stand from `at` on: near nothing, and once far from it where it is nonlinear
+/// in them and has more than one valley.
+std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector<Coordinate>& c, std::size_t at) {
+  const double nothing = c[at].start;
+  std::vector<std::vector<double>> out;
+  switch (cause.edit) {
+    case Edit::cooling_step:  // ln of the factor, and when as a share of the log
+      for (const double when : {0.15, 0.33, 0.5, 0.67, 0.85}) out.push_back({0.1, when});
+      return out;
+    case Edit::sensor_lag:  // s
+      return {{3}, {30}, {75}};
+    case Edit::delay:  // s
+      return {{2}, {20}, {-10}};
+    case Edit::mass:
+    case Edit::hot_spot:  // ln of capacity and resistance: the time constant goes by half of what the capacity goes
+      for (const double shift : {0.0, -2.0}) out.push_back({nothing + shift, c[at + 1].start - shift / 2});
+      return out;
+    default:
+      return {{nothing + 0.1 * c[at].sd}};
+  }
+}
+
 }  // namespace
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
@@ -432,23 +454,10 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     return larger.cost < f.cost ? larger : f;
   }
 
-  // The last cause starts near nothing, and once far from it: what is nonlinear in its parameters has more than one
-  // valley. A few steps tell which is worth descending into.
+  // A few steps tell which valley is worth descending into.
   constexpr int look = 4;
-  const Cause& unknown = causes()[static_cast<std::size_t>(chosen.back().cause)];
-  const double start0 = x[last], sd0 = c[static_cast<std::size_t>(last)].sd;
-  std::vector<std::vector<double>> starts;
-  if (unknown.edit == Edit::cooling_step) {
-    for (const double when : {0.15, 0.33, 0.5, 0.67, 0.85}) starts.push_back({0.1, when});
-  } else if (unknown.parameters.front().logarithmic && unknown.parameters.size() == 2) {
-    for (const double shift : {0.0, -2.0}) starts.push_back({start0 + shift, x[last + 1] - shift / 2});
-  } else if (unknown.edit == Edit::sensor_lag) {
-    starts = {{3}, {30}, {75}};
-  } else if (unknown.edit == Edit::delay) {
-    starts = {{2}, {20}, {-10}};
-  } else {
-    starts = {{start0 + 0.1 * sd0}};
-  }
+  const Cause& unknown = cause_of(chosen.back());
+  const auto starts = starts_of(unknown, c, static_cast<std::size_t>(last));
   Fit best;
   for (const auto& start : starts) {
     for (std::size_t p = 0; p < start.size(); ++p) x[last + static_cast<Eigen::Index>(p)] = start[p];

@@ -114,6 +114,11 @@ int score(const Arguments& a, const identify::ColumnMap& map, const std::optiona
   return 0;
 }
 
+void show(const std::string& text) {
+  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+    throw UserError(Exit::usage, "standard output: cannot be written; the answer is not complete.");
+}
+
 int answer(Arguments a) {
   std::optional<wire::pc::MotorFile> motor;
   if (!a.motor.empty()) {
@@ -139,12 +144,11 @@ int answer(Arguments a) {
   if (!a.write_model.empty()) wire::pc::write_whole(a.write_model, report.model_toml);
   if (!a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
   if (a.json == "-") {
-    fmt::print("{}", as_json(report));
+    show(as_json(report));
     return 0;
   }
   if (!a.json.empty()) wire::pc::write_whole(a.json, as_json(report));
-  fmt::print("{}", as_text(report, a.explain));
-  if (!a.html.empty()) fmt::print("\nReport with pictures: {}\n", a.html);
+  show(as_text(report, a.explain) + (a.html.empty() ? "" : "\nReport with pictures: " + a.html + "\n"));
   return 0;
 }
 
@@ -192,10 +196,7 @@ int main(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(Exit::usage);
   }
   try {
-    const int code = answer(a);
-    if (std::fflush(stdout) != 0)
-      throw UserError(Exit::usage, "standard output: cannot be written; the answer is not complete.");
-    return code;
+    return answer(a);
   } catch (const UserError& error) {
     fmt::print(stderr, "{}\n", error.what());
     return error.exit_code();

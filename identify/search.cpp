@@ -42,10 +42,10 @@ void sort(std::vector<Candidate>& list) {
 
 /// Two causes that claim the same slot of the model cannot both be applied.
 bool compatible(const std::vector<Chosen>& have, const Chosen& more) {
-  const Cause& b = causes()[static_cast<std::size_t>(more.cause)];
+  const Cause& b = cause_of(more);
   int nodes = b.edit == Edit::mass || b.edit == Edit::hot_spot;
   for (const Chosen& c : have) {
-    const Cause& a = causes()[static_cast<std::size_t>(c.cause)];
+    const Cause& a = cause_of(c);
     if (c.cause == more.cause && (!of_one_log(b) || c.log == more.log)) return false;
     if (a.edit == Edit::sink_law && b.edit == Edit::sink_law) return false;
     nodes += a.edit == Edit::mass || a.edit == Edit::hot_spot;
@@ -512,7 +512,7 @@ const char* word(Verdict v) {
 
 std::vector<std::string> ids_of(const std::vector<Chosen>& chosen) {
   std::vector<std::string> out;
-  for (const Chosen& c : chosen) out.emplace_back(causes()[static_cast<std::size_t>(c.cause)].id);
+  for (const Chosen& c : chosen) out.emplace_back(cause_of(c).id);
   std::sort(out.begin(), out.end());
   return out;
 }

@@ -180,7 +180,7 @@ TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
   EXPECT_EQ(file["link"].as_array()->size(), 2u);
   ASSERT_EQ(file["source"].as_array()->size(), 2u);
   EXPECT_EQ(file["source"][1]["drive"].value_or(std::string()), "current_speed");
-  const auto& cause = identify::causes()[static_cast<std::size_t>(f.chosen[0].cause)];
+  const auto& cause = identify::cause_of(f.chosen[0]);
   EXPECT_NEAR(file["source"][1]["gain"].value_or(0.0), identify::parameter_value(log.problem, cause, 0, f.x[4]),
               1e-4 * std::abs(f.x[4]));
 }

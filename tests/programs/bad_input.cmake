@@ -86,6 +86,7 @@ identify(column_without_a_name 2 "the column's name is missing" fine.csv --colum
 identify(no_place_for_the_model 2 "cannot be written" fine.csv --write-model /proc/nowhere/model.toml)
 identify(score_and_an_answer 2 "excludes --score" fine.csv --score fine.csv)
 refuse(score_without_truth 2 "truth.json: there is no such file" ${IDENTIFY} fine.csv --score truth.json)
+refuse(full_device 2 "standard output: cannot be written" sh -c "${IDENTIFY} fine.csv --json - > /dev/full")
 refuse(no_log 2 "LOG is required" ${IDENTIFY} --json -)
 refuse(bad_log_for_standard_output 3 "torn.csv.*line" ${IDENTIFY} torn.csv --json -)
 identify(unknown_motor 2 "did you mean 'ec-16-40w'" fine.csv --motor ec-16-40)
