@@ -125,15 +125,13 @@ std::string core_refusal(const Problem& problem, const Fit& f) {
   if (problem.belief.copper_per_K == 0) {
     return "The winding temperature cannot be found from the housing alone when the heat does not depend on the "
            "winding: the housing fixes only R2, R1 C1 + R2 (C1 + C2) and R1 C1 R2 C2, three numbers for four unknowns. "
-           "No winding temperature is stated; "
-           "record core_degC now and then.";
+           "No winding temperature is stated; record core_degC now and then.";
   }
   const double sd = sd_from_data(f, 0);
   if (sd < 1) return "";
   return fmt::format(
       "This log does not determine R1 (known to a factor of {:.0f}): no winding temperature is stated; record "
-      "core_degC "
-      "now and then, or load the motor until it is hot.",
+      "core_degC now and then, or load the motor until it is hot.",
       std::exp(std::min(sd, 6.0)));
 }
 

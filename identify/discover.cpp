@@ -266,9 +266,10 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
       problem.noise.idle_s > 60
           ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.",
                         problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.idle_s)
-          : fmt::format("Noise of a housing reading: {:.3f} K white from its differences; too little rest to see the "
-                        "slow part, {:.3f} K assumed.",
-                        problem.noise.housing_white_K, problem.noise.housing_slow_K));
+          : fmt::format(
+                "Noise of a housing reading: {:.3f} K white from its differences; {:.3f} K slow, mostly assumed, "
+                "for lack of rest.",
+                problem.noise.housing_white_K, problem.noise.housing_slow_K));
   std::string poor = too_poor(problem, base);
   Search found;
   if (poor.empty()) {

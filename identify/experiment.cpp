@@ -177,8 +177,8 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
                        : best_D < 40 ? "a chance of about 90 %"
                                      : "near certainty";
   best.why = fmt::format(
-      "{}: the tied models then differ by {:.0f} squared noise units or more, {} of telling them apart; the winding "
-      "stays below {:.0f} degC",
+      "{}: the tied models then differ by {:.0f} squared noise units or more, with {} of telling them apart; the "
+      "winding stays below {:.0f} degC",
       best.why, best_D, chance, problem.belief.winding_max_degC - spare_K);
   for (const Candidate* c : tied) {
     for (const std::string& id : ids_of(c->fit.chosen)) {

@@ -385,8 +385,9 @@ bool ends_without_a_name(const Problem& problem, const Field& field, const Distu
           : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
                         margins.detect, first, gain));
   if (disturbed)
-    out.steps.push_back(fmt::format("Yet a slow disturbance of {:.2f} K gains {:.0f}.",
-                                    without_causes.noise.disturbance_K, without_causes.gain));
+    out.steps.push_back(
+        fmt::format("Yet a slow disturbance of {:.2f} K without a name gains {:.0f}: something is missing.",
+                    without_causes.noise.disturbance_K, without_causes.gain));
   return true;
 }
 
@@ -439,8 +440,8 @@ struct Left {
 
   std::string words() const {
     return fmt::format(
-        "{:.2f} K were missed, beside it a slow disturbance of {:.2f} K would gain {:.1f}; over a disturbance alone it "
-        "gains {:.1f}",
+        "two resistors missed {:.2f} K; beside the best set a slow disturbance of {:.2f} K would gain another {:.1f}; "
+        "over a disturbance alone the two gain {:.1f}",
         before_K, after_K, gain, explains);
   }
 };
@@ -555,9 +556,9 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     out.verdict = tie ? Verdict::ambiguous : left.complete ? Verdict::explained : Verdict::partly_explained;
     out.remains_K = left.complete ? 0 : left.after_K;
     out.steps.push_back(
-        tie ? fmt::format("Others come within {:.0f}, {} of them near: they cannot be told apart with this data; {}.",
-                          reach, out.tied.size() - 1, left.words())
-            : fmt::format("No other set comes within {:.0f}; {}.", reach, left.words()));
+        tie ? fmt::format("{} other set{} within {:.0f} of it cannot be told from it with this data; {}.",
+                          out.tied.size() - 1, out.tied.size() > 2 ? "s" : "", reach, left.words())
+            : fmt::format("No other set comes within {:.0f} of it; {}.", reach, left.words()));
     if (!left.complete && !left.mostly)
       out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }

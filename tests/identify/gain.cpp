@@ -114,8 +114,7 @@ int main(int argc, char** argv) {
   else
     fmt::print(
         "{} motors; two resistors, fitted, miss {} (overshoot above {:g} K or less than {:g} % of the burst); the "
-        "model "
-        "found puts {} of these right and spoils {} of the others\n",
+        "model found puts {} of these right and spoils {} of the others\n",
         seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed);
   return check && harmed > 0 ? 1 : 0;
 }
