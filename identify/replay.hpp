@@ -89,7 +89,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
   if (model.offset)
     in[Drive::current_A2] +=
         model.current_offset_A * (2 * bin.signed_A) + model.current_offset_A * model.current_offset_A;
-  if (model.stalls) in[Drive::current_A2] += model.stall_share * bin.stalled_A2;
+  const double a2 = bin.input[Drive::current_A2];
+  if (model.stalls && a2 > 0) in[Drive::current_A2] *= model.stall_share * (bin.stalled_A2 / a2) + 1.0;
   if (model.drifts) {
     in[Boundary::ambient] += model.drift_K_per_s * time_s;
     in[Boundary::coolant] += model.drift_K_per_s * time_s;

@@ -282,10 +282,9 @@ void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& fi
   field.singles = singles_of(problem, all, field.base, field.singles);
 }
 
-void fit_pairs(const Problem& problem, Field& field) {
-  field.pairs = pairs_of(problem, field.base, field.singles);
-  // A second cause may only have helped the first out of a poor valley: each alone starts again from where the pair
-  // ended, and the pair must beat that.
+/// A second cause may only have helped the first out of a poor valley: each alone starts again from where the best
+/// pairs ended, and a pair must beat that. True when one was so deep in it that pairs looked at from there mean little.
+bool start_singles_again(const Problem& problem, Field& field) {
   struct Again {
     Candidate* alone;
     const Fit* both;
@@ -300,11 +299,22 @@ void fit_pairs(const Problem& problem, Field& field) {
     }
   }
   in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
+  bool deep = false;
   for (Again& again : all) {
-    if (again.fit.x.size() > 0 && again.fit.cost < again.alone->fit.cost)
-      *again.alone = candidate(field.base, std::move(again.fit));
+    if (again.fit.x.size() == 0 || again.fit.cost >= again.alone->fit.cost) continue;
+    deep = deep || 2 * (again.alone->fit.cost - again.fit.cost) > look_errs;
+    *again.alone = candidate(field.base, std::move(again.fit));
   }
   sort(field.singles);
+  return deep;
+}
+
+void fit_pairs(const Problem& problem, Field& field) {
+  constexpr int rounds = 3;
+  for (int i = 0; i < rounds; ++i) {
+    field.pairs = pairs_of(problem, field.base, field.singles);
+    if (!start_singles_again(problem, field)) break;
+  }
 }
 
 /// Why the best pair is not believed; empty when it is.
@@ -434,6 +444,8 @@ struct Left {
   double before_K, after_K;  // missed by the baseline; of a disturbance beside the set
   double gain;               // of that disturbance
   double explains;           // gain of the set with it over a disturbance alone
+  double by_parts;           // what parts of the logs, each fitted for itself, gain over one fit
+  bool steady;               // which is chance: one set of parameters serves all parts
   bool complete;             // no more than noise is left
   bool mostly;               // little is left beside what was explained
   bool nearly;               // what is left may be the sensors' own, since no rest has shown how they wander
@@ -441,13 +453,29 @@ struct Left {
   std::string words() const {
     return fmt::format(
         "two resistors missed {:.2f} K; beside the best set a slow disturbance of {:.2f} K would gain another {:.1f}; "
-        "over a disturbance alone the two gain {:.1f}",
-        before_K, after_K, gain, explains);
+        "over a disturbance alone the two gain {:.1f}{}",
+        before_K, after_K, gain, explains,
+        steady ? "" : fmt::format("; parts of the log, each fitted for itself, gain {:.1f} more", by_parts));
   }
 };
 
-Left left_by_chosen(const Problem& problem, const Search& found, const Disturbance& without_causes,
-                    const Margins& margins) {
+/// What two parts of the logs, each fitted for itself, gain over one fit of all, at the cut where they gain most. A set
+/// of the right form wants the same parameters in both (Chow, Econometrica 28, 1960); an imitation does not.
+double gained_by_parts(const Problem& problem, const Fit& all) {
+  constexpr double cuts[] = {1.0 / 3, 0.5, 2.0 / 3};
+  double misfit[2 * std::size(cuts)];
+  in_parallel(std::size(misfit), [&](std::size_t i) {
+    const double cut = cuts[i / 2];
+    misfit[i] = fit(i % 2 == 0 ? first_part(problem, cut) : last_part(problem, cut), all.chosen, {&all}).misfit;
+  });
+  double most = 0;
+  for (std::size_t i = 0; i < std::size(misfit); i += 2)
+    most = std::max(most, 2 * (all.misfit - misfit[i] - misfit[i + 1]));
+  return most;
+}
+
+Left left_by_chosen(const Problem& problem, const Problem& judged, const Search& found,
+                    const Disturbance& without_causes, const Margins& margins) {
   const std::vector<Chosen>& chosen = found.chosen.fit.chosen;
   const Disturbance left = disturbance_of(problem, fit(problem, chosen, {&found.chosen.fit}));
   const Rmse missed = rmse_of(problem, found.base.fit);
@@ -456,10 +484,14 @@ Left left_by_chosen(const Problem& problem, const Search& found, const Disturban
   out.after_K = left.noise.disturbance_K;
   out.gain = left.gain;
   out.explains = left.evidence - without_causes.evidence;
-  out.complete = left.gain < margins.remains;
-  out.mostly = (chosen.size() == 1 && out.explains > margins.dominance * left.gain) ||
-               out.after_K < margins.small_part * out.before_K;
-  out.nearly = problem.noise.idle_s == 0 && out.after_K < margins.small_part_unseen * out.before_K;
+  out.by_parts = gained_by_parts(judged, found.chosen.fit);
+  out.steady = out.by_parts < margins.parts;
+  out.complete = left.gain < margins.remains && out.steady;
+  const bool rules_parts = out.steady || out.explains > margins.dominance * out.by_parts;
+  out.mostly = rules_parts &&
+               (left.gain < margins.remains || (chosen.size() == 1 && out.explains > margins.dominance * left.gain) ||
+                out.after_K < margins.small_part * out.before_K);
+  out.nearly = rules_parts && problem.noise.idle_s == 0 && out.after_K < margins.small_part_unseen * out.before_K;
   return out;
 }
 
@@ -538,7 +570,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
 
   const Problem judged = judged_by_what_remains(problem, all, margins, field, out);
   choose(judged, margins, std::move(field), out);
-  const Left left = left_by_chosen(problem, out, without_causes, margins);
+  const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const double reach = left.complete ? margins.tie : margins.tie + left.gain;
   mark_ties(problem, left, reach, margins, out);
 

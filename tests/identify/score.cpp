@@ -206,7 +206,8 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       if (row.hidden == Hidden::removed) c.removed = effects;
       if (!a.remove.empty()) c.removed.push_back(a.remove);
       c.margins = a.margins;
-      c.gain = c.separability = row.hidden == Hidden::each_cause && !a.quick;
+      c.gain = row.hidden == Hidden::each_cause && !a.quick;
+      c.separability = !a.quick && (row.hidden == Hidden::each_cause || row.hidden == Hidden::pairs);
       c.follow = row.hidden == Hidden::each_cause && row.core == Core::sparse && !a.quick;
       out.push_back(std::move(c));
     }
@@ -235,6 +236,8 @@ void add_measures(const Row& row, const std::vector<CaseResult>& results, Table&
     ratios.push_back(*r.core_before_K / std::max(*r.core_after_K, 1e-3));
     worse += *r.core_after_K > *r.core_before_K + 0.05;  // K: half a step of the housing sensor
   }
+  if (row.hidden == Hidden::pairs && seen > 0)
+    table.add(row.key, "D >= 3 named exactly", seen_named, seen, true, row.bounds[0].promised, 0.40);
   if (ratios.empty()) return;
   table.add_median(row.key, "winding unseen: error before/after", ratios, row.duty == Duty::designed ? 5 : 3, 1.0);
   table.add(row.key, "winding unseen: worse", worse, static_cast<int>(ratios.size()), false, 0.02, 0.30);

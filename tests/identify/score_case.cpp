@@ -77,25 +77,44 @@ void check_parameters(const HiddenLog& log, const Problem& problem, const Search
   }
 }
 
-/// How far the nearest rival stays behind when the truth makes this log without noise.
-double separability(const Problem& problem, const std::vector<std::string>& truth) {
+/// The log as the fitted truth makes it, without noise.
+Problem without_noise(const Problem& problem, const std::vector<std::string>& truth) {
+  Problem out = problem;
   std::vector<identify::Chosen> chosen;
   for (const std::string& id : truth) chosen.push_back({identify::cause_named(id), -1});
-  Problem clean = problem;
   const auto replayed = identify::replayed(problem, identify::fit(problem, chosen), 0);
-  for (std::size_t k = 0; k < clean.logs.front().bins.size(); ++k) {
-    identify::Bin& bin = clean.logs.front().bins[k];
+  for (std::size_t k = 0; k < out.logs.front().bins.size(); ++k) {
+    identify::Bin& bin = out.logs.front().bins[k];
     if (bin.housing_n > 0) bin.housing_degC = replayed.housing_degC[k];
     if (bin.core_n > 0) bin.core_degC = replayed.core_degC[k];
   }
+  return out;
+}
+
+/// How far the nearest rival stays behind on a log without noise: of the sets with no more causes than the truth.
+double separability(const Problem& clean, const std::vector<std::string>& truth) {
   const Fit base = identify::fit(clean, {});
   double D = 2 * base.misfit;
+  std::vector<Fit> singles;
   for (std::size_t c = 0; c < identify::causes().size(); ++c) {
     const identify::Cause& cause = identify::causes()[c];
-    if (std::find(truth.begin(), truth.end(), cause.id) != truth.end() || !clean.possible(cause) ||
-        cause.edit == identify::Edit::cooling_of_log)
-      continue;
-    D = std::min(D, 2 * identify::fit(clean, {{static_cast<int>(c), -1}}, {&base}).misfit);
+    if (!clean.possible(cause) || identify::of_one_log(cause) || truth == std::vector<std::string>{cause.id}) continue;
+    singles.push_back(identify::fit(clean, {{static_cast<int>(c), -1}}, {&base}));
+    D = std::min(D, 2 * singles.back().misfit);
+  }
+  if (truth.size() == 1) return D;
+  std::sort(singles.begin(), singles.end(), [](const Fit& a, const Fit& b) { return a.misfit < b.misfit; });
+  for (std::size_t a = 0; a < singles.size(); ++a) {
+    for (std::size_t b = a + 1; b < singles.size(); ++b) {
+      const std::vector<identify::Chosen> pair = {singles[a].chosen.front(), singles[b].chosen.front()};
+      const identify::Cause &x = identify::cause_of(pair[0]), &y = identify::cause_of(pair[1]);
+      const bool one_slot = x.edit == identify::Edit::sink_law && y.edit == identify::Edit::sink_law;
+      if (one_slot || std::string(x.id) == y.id || identify::ids_of(pair) == truth) continue;
+      constexpr int look_steps = 3, most_steps = 20;
+      const Fit look = identify::fit(clean, pair, {&singles[a], &singles[b]}, look_steps);
+      if (look.x.size() == 0 || 2 * (look.misfit - 2 * look.promise) > D) continue;
+      D = std::min(D, 2 * identify::fit(clean, pair, {&look}, most_steps).misfit);
+    }
   }
   return D;
 }
@@ -162,8 +181,7 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
                                found.base.ratio, found.chosen.ratio, found.chosen.explained);
   check_parameters(log, problem, found, result);
-  if (options.separability && result.truth.size() == 1 && identify::cause_named(result.truth.front()) >= 0)
-    result.D = separability(problem, result.truth);
+  if (options.separability) result.D = separability(without_noise(problem, result.truth), result.truth);
   if (options.gain) measure_gain(options, log, problem, found, path, result);
   if (options.follow && found.verdict == Verdict::ambiguous) follow(options, log, logs, problem, found, path, result);
   return result;

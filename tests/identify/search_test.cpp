@@ -147,19 +147,51 @@ TEST(Search, AnEffectOutsideTheTableThatAPairImitatesIsCalledUnknown) {
   const Hidden log = hidden({"grease"}, 4436);
   EXPECT_EQ(identify::search(log.problem).verdict, Verdict::unknown_cause);
   identify::Margins blind;  // to what a set leaves: then the imitation is named
-  blind.remains = 1e9;
+  blind.remains = blind.parts = 1e9;
   EXPECT_TRUE(names(identify::search(log.problem, blind)));
+}
+
+TEST(Search, AnImitationThatWantsOtherParametersInEachPartOfTheLogIsNotNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({"contact"}, 687436);
+  EXPECT_EQ(identify::search(log.problem).verdict, Verdict::unknown_cause);
+  identify::Margins blind;
+  blind.parts = 1e9;
+  EXPECT_TRUE(names(identify::search(log.problem, blind)));
+}
+
+TEST(Search, AStallHeatsByTheCurrentThatFlowsNotByTheOneThatWasRead) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::HiddenLogOptions o;
+  o.seed = 850041;
+  o.effects = {"current_offset", "stall_imbalance"};
+  const Hidden log = hidden(o);
+  const auto found = identify::search(log.problem);
+  EXPECT_EQ(found.verdict, Verdict::explained);
+  EXPECT_EQ(found.tied.front(), o.effects);
 }
 
 TEST(Search, WhereNoRestShowsHowTheSensorsWanderWhatIsLeftMayBeTheirs) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
-  Hidden log = hidden({"grease"}, 680436);
+  Hidden log = hidden({"gusts"}, 684436);
   ASSERT_GT(log.problem.noise.idle_s, 0);
   EXPECT_EQ(identify::search(log.problem).verdict, Verdict::unknown_cause);
   log.problem.noise.idle_s = 0;
   const auto found = identify::search(log.problem);
   EXPECT_EQ(found.verdict, Verdict::ambiguous) << "a tie, never a name";
   EXPECT_GT(found.remains_K, 0);
+}
+
+TEST(Search, PairsAreLookedAtAgainWhereACauseAloneStayedInAPoorValley) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::HiddenLogOptions o;
+  o.duty = tests::Duty::designed;
+  o.seed = 850027;
+  o.effects = {"board_heat", "frame_conduction"};
+  const Hidden log = hidden(o);
+  const auto found = identify::search(log.problem);
+  EXPECT_EQ(found.verdict, Verdict::explained);
+  EXPECT_EQ(found.tied.front(), o.effects) << "frame_conduction + hot_spot after one round";
 }
 
 TEST(Search, TheBaselineDoesNotStayInAPoorValley) {
