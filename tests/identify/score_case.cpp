@@ -91,18 +91,25 @@ Problem without_noise(const Problem& problem, const std::vector<std::string>& tr
   return out;
 }
 
-/// How far the nearest rival stays behind on a log without noise: of the sets with no more causes than the truth.
-double separability(const Problem& clean, const std::vector<std::string>& truth) {
+/// How far the nearest rival stays behind on a log without noise: of the sets with no more causes than the truth, or
+/// with two where the truth was taken out of the table.
+double separability(const Problem& clean, const std::vector<std::string>& truth,
+                    const std::vector<std::string>& removed) {
+  const auto out_of_table = [&](const identify::Cause& cause) {
+    return std::find(removed.begin(), removed.end(), cause.id) != removed.end();
+  };
   const Fit base = identify::fit(clean, {});
   double D = 2 * base.misfit;
   std::vector<Fit> singles;
   for (std::size_t c = 0; c < identify::causes().size(); ++c) {
     const identify::Cause& cause = identify::causes()[c];
-    if (!clean.possible(cause) || identify::of_one_log(cause) || truth == std::vector<std::string>{cause.id}) continue;
+    if (!clean.possible(cause) || identify::of_one_log(cause) || out_of_table(cause) ||
+        truth == std::vector<std::string>{cause.id})
+      continue;
     singles.push_back(identify::fit(clean, {{static_cast<int>(c), -1}}, {&base}));
     D = std::min(D, 2 * singles.back().misfit);
   }
-  if (truth.size() == 1) return D;
+  if (truth.size() == 1 && removed.empty()) return D;
   std::sort(singles.begin(), singles.end(), [](const Fit& a, const Fit& b) { return a.misfit < b.misfit; });
   for (std::size_t a = 0; a < singles.size(); ++a) {
     for (std::size_t b = a + 1; b < singles.size(); ++b) {
@@ -181,7 +188,8 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
                                found.base.ratio, found.chosen.ratio, found.chosen.explained);
   check_parameters(log, problem, found, result);
-  if (options.separability) result.D = separability(without_noise(problem, result.truth), result.truth);
+  if (options.separability)
+    result.D = separability(without_noise(problem, result.truth), result.truth, options.removed);
   if (options.gain) measure_gain(options, log, problem, found, path, result);
   if (options.follow && found.verdict == Verdict::ambiguous) follow(options, log, logs, problem, found, path, result);
   return result;
