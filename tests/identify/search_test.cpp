@@ -182,6 +182,18 @@ TEST(Search, WhereNoRestShowsHowTheSensorsWanderWhatIsLeftMayBeTheirs) {
   EXPECT_GT(found.remains_K, 0);
 }
 
+TEST(Search, WhereTwoResistorsAreFarOffCausesStartFromTheSheetToo) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::HiddenLogOptions o;
+  o.core = tests::Core::none;
+  o.seed = 770255;
+  o.effects = {"frame_conduction"};
+  const Hidden log = hidden(o);
+  const auto found = identify::search(log.problem);
+  EXPECT_EQ(found.verdict, Verdict::explained);
+  EXPECT_EQ(found.tied.front(), o.effects) << "frame_conduction + sensor_lag from the two resistors alone";
+}
+
 TEST(Search, PairsAreLookedAtAgainWhereACauseAloneStayedInAPoorValley) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::HiddenLogOptions o;
