@@ -11,8 +11,8 @@ namespace identify {
 
 /// What the decision asks for: twice the logarithm of evidence where nothing else is said.
 struct Margins {
-  /// 10 gave 11 alarms on 656 clean logs (duty and designed, seeds from 780), some while the baseline's fit could stay
-  /// in a poor valley; by chance evidence is exceeded e times less often for every two more.
+  /// 3 alarms on 1000 clean logs (duty and designed, seeds from 3200); by chance evidence is exceeded e times less
+  /// often for every two more.
   double detect = 13;
   double second = 10, tie = 6;
   /// Of a slow disturbance beside a set of causes: above it the set is not complete. Rightly named causes gained less

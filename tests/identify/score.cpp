@@ -239,8 +239,10 @@ void add_measures(const Row& row, const std::vector<CaseResult>& results, Table&
   }
   if (row.hidden == Hidden::removed && far > 0)
     table.add(row.key, "D > 40 another one named", far_answered, far, false, row.bounds[0].promised, 0.30);
-  if (row.hidden == Hidden::pairs && seen > 0)
+  if (row.hidden == Hidden::pairs && seen > 0) {
     table.add(row.key, "D >= 3 named exactly", seen_named, seen, true, row.bounds[0].promised, 0.40);
+    table.add(row.key, "D > 40 named exactly", far_named, far, true, row.bounds[0].promised, 0.40);
+  }
   if (ratios.empty()) return;
   table.add_median(row.key, "winding unseen: error before/after", ratios, row.duty == Duty::designed ? 5 : 3, 1.0);
   table.add(row.key, "winding unseen: worse", worse, static_cast<int>(ratios.size()), false, 0.02, 0.30);
