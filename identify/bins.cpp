@@ -15,8 +15,8 @@ namespace {
 using thermal::Boundary;
 using thermal::Drive;
 
-constexpr double most_bins =
-    200000;  // 36,000 take a search 12 to 17 s on one core (README), so these a minute and a half
+/// 36,000 take a search 11 to 17 s on one core (README), so these a minute and a half.
+constexpr double most_bins = 200000;
 
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 

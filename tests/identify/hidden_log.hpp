@@ -25,9 +25,9 @@ struct HiddenLogOptions {
   Duty duty = Duty::robot;
   Core core = Core::sparse;
   std::uint64_t seed = 1;
-  std::vector<std::string> effects;  // ids of hideable() and outside()
-  double strength = 1;               // of the size drawn
-  bool mostly_small = false;         // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
+  std::vector<std::string> effects = {};  // ids of hideable() and outside()
+  double strength = 1;                    // of the size drawn
+  bool mostly_small = false;              // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
   double structure = 0.1;  // how far the clean motor is from two nodes: teeth, yoke, frame, 1 as host-sim has them
   double seconds = 1200;
   bool small_ones = false;  // eleven small effects besides
@@ -35,7 +35,7 @@ struct HiddenLogOptions {
   // A further log of the same motor with the same effect, sized as before: another duty and noise from this seed, or
   // this profile played.
   std::uint64_t again = 0;
-  std::vector<ProfileStretch> profile;
+  std::vector<ProfileStretch> profile = {};
 };
 
 struct HiddenLog {

@@ -55,6 +55,13 @@ bool names(const identify::Search& s) {
   return s.verdict == Verdict::explained || s.verdict == Verdict::partly_explained;
 }
 
+/// `otherwise`: what it was called before.
+void expect_named(const tests::HiddenLogOptions& o, const char* otherwise) {
+  const auto found = identify::search(hidden(o).problem);
+  EXPECT_EQ(found.verdict, Verdict::explained) << otherwise;
+  EXPECT_EQ(found.tied.front(), o.effects) << otherwise;
+}
+
 TEST(Search, FindsWhatIsHiddenAndNamesNothingElse) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   int named = 0, wrong = 0;
@@ -162,13 +169,8 @@ TEST(Search, AnImitationThatWantsOtherParametersInEachPartOfTheLogIsNotNamed) {
 
 TEST(Search, AStallHeatsByTheCurrentThatFlowsNotByTheOneThatWasRead) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
-  tests::HiddenLogOptions o;
-  o.seed = 850041;
-  o.effects = {"current_offset", "stall_imbalance"};
-  const Hidden log = hidden(o);
-  const auto found = identify::search(log.problem);
-  EXPECT_EQ(found.verdict, Verdict::explained);
-  EXPECT_EQ(found.tied.front(), o.effects);
+  expect_named({.seed = 850041, .effects = {"current_offset", "stall_imbalance"}},
+               "tied with current_offset + natural_convection by the current that was read");
 }
 
 TEST(Search, WhereNoRestShowsHowTheSensorsWanderWhatIsLeftMayBeTheirs) {
@@ -184,26 +186,14 @@ TEST(Search, WhereNoRestShowsHowTheSensorsWanderWhatIsLeftMayBeTheirs) {
 
 TEST(Search, WhereTwoResistorsAreFarOffCausesStartFromTheSheetToo) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
-  tests::HiddenLogOptions o;
-  o.core = tests::Core::none;
-  o.seed = 770255;
-  o.effects = {"frame_conduction"};
-  const Hidden log = hidden(o);
-  const auto found = identify::search(log.problem);
-  EXPECT_EQ(found.verdict, Verdict::explained);
-  EXPECT_EQ(found.tied.front(), o.effects) << "frame_conduction + sensor_lag from the two resistors alone";
+  expect_named({.core = tests::Core::none, .seed = 770255, .effects = {"frame_conduction"}},
+               "frame_conduction + sensor_lag from the two resistors alone");
 }
 
 TEST(Search, PairsAreLookedAtAgainWhereACauseAloneStayedInAPoorValley) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
-  tests::HiddenLogOptions o;
-  o.duty = tests::Duty::designed;
-  o.seed = 850027;
-  o.effects = {"board_heat", "frame_conduction"};
-  const Hidden log = hidden(o);
-  const auto found = identify::search(log.problem);
-  EXPECT_EQ(found.verdict, Verdict::explained);
-  EXPECT_EQ(found.tied.front(), o.effects) << "frame_conduction + hot_spot after one round";
+  expect_named({.duty = tests::Duty::designed, .seed = 850027, .effects = {"board_heat", "frame_conduction"}},
+               "frame_conduction + hot_spot after one round");
 }
 
 TEST(Search, TheBaselineDoesNotStayInAPoorValley) {
