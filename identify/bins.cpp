@@ -15,7 +15,7 @@ namespace {
 using thermal::Boundary;
 using thermal::Drive;
 
-/// 36,000 take a search 11 to 17 s on one core (README), so these a minute and a half.
+/// 36,000 take a search 8 to 17 s on one core (README), so these a minute and a half at most.
 constexpr double most_bins = 200000;
 
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
