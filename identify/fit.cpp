@@ -446,12 +446,20 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     at += parameters;
   }
   if (last_is_known) {
-    Fit f = descend(problem, leeway, chosen, c, x, most);
-    if (warm.size() > 0) return f;
+    Fit best = descend(problem, leeway, chosen, c, x, most);
+    if (warm.size() > 0 || best.x.size() == 0) return best;
+    const auto start_at = [&](const Eigen::VectorXd& other) {
+      Fit f = descend(problem, leeway, chosen, c, other, most);
+      if (f.cost < best.cost) best = std::move(f);
+    };
     // Where the winding is fast and read now and then, too small a capacity has a valley of its own.
     x[2] += std::log(4.0);
-    Fit larger = descend(problem, leeway, chosen, c, x, most);
-    return larger.cost < f.cost ? larger : f;
+    start_at(x);
+    // With the two masses exchanged the housing looks nearly the same.
+    x = best.x;
+    std::swap(x[2], x[3]);
+    start_at(x);
+    return best;
   }
 
   // A few steps tell which valley is worth descending into.

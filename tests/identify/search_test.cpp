@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "identify/baseline.hpp"
 #include "identify/experiment.hpp"
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
@@ -19,7 +20,7 @@
 
 namespace {
 
-using identify::Verdict;
+using identify::Problem, identify::Verdict;
 
 struct Hidden {
   identify::Problem problem;
@@ -173,6 +174,18 @@ TEST(Search, AStallHeatsByTheCurrentThatFlowsNotByTheOneThatWasRead) {
                "tied with current_offset + natural_convection by the current that was read");
 }
 
+TEST(Search, OverManySmallEffectsTheLargestIsSaidToBeMostOfIt) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::HiddenLogOptions crowd;
+  crowd.duty = tests::Duty::designed;
+  crowd.seed = 770255;
+  crowd.effects = {"winding_eddy"};
+  crowd.small_ones = true;
+  const auto found = identify::search(hidden(crowd).problem);
+  EXPECT_EQ(found.verdict, Verdict::partly_explained) << "unknown_cause while only one cause alone could be most of it";
+  EXPECT_EQ(found.tied.front(), (std::vector<std::string>{"ac_copper_loss", "winding_eddy"}));
+}
+
 TEST(Search, WhereNoRestShowsHowTheSensorsWanderWhatIsLeftMayBeTheirs) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({"gusts"}, 684436);
@@ -203,6 +216,15 @@ TEST(Search, TheBaselineDoesNotStayInAPoorValley) {
   const auto found = identify::search(hidden(fast_winding).problem);
   EXPECT_EQ(found.verdict, Verdict::adequate);
   EXPECT_LT(found.singles.front().gain, 3) << "25 before the four started again";
+}
+
+TEST(Search, WindingAndHousingAreNotExchangedWhereTheSheetIsFarOff) {
+  tests::HiddenLogOptions slow_winding;
+  slow_winding.duty = tests::Duty::designed;
+  slow_winding.seed = 3312000;
+  Problem problem = hidden(slow_winding).problem;
+  problem.belief.R2_K_per_W /= 2;
+  EXPECT_LT(identify::rmse_of(problem, identify::fit(problem, {})).core_K, 2.5) << "5.7 K with the masses exchanged";
 }
 
 TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
