@@ -40,7 +40,9 @@ bool covered(const CaseResult& r) { return right(r) || r.outcome() == Outcome::t
 bool alarm(const CaseResult& r) { return r.verdict != Verdict::adequate; }
 bool unknown(const CaseResult& r) { return r.verdict == Verdict::unknown_cause; }
 bool named(const CaseResult& r) { return r.named(); }
+/// "Unknown" names nothing, though it prints what came closest.
 bool dominant(const CaseResult& r) {
+  if (!r.named() && r.verdict != Verdict::ambiguous) return false;
   return std::any_of(r.answer.begin(), r.answer.end(),
                      [&](const auto& ids) { return std::find(ids.begin(), ids.end(), r.truth.front()) != ids.end(); });
 }
