@@ -12,6 +12,7 @@
 #include "identify/held_out.hpp"
 #include "identify/model_file.hpp"
 #include "identify/search.hpp"
+#include "identify/units.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -171,6 +172,53 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
+/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors on the columns read otherwise leave no more
+/// than the best cause does on these. Empty when nothing helps.
+std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
+                            const std::optional<wire::pc::MotorFile>& motor) {
+  const double as_it_stands = fit(problem, {}).misfit;
+  const auto explained_by = [&](const std::vector<Log>& otherwise) {
+    constexpr double no_more = 1.02;  // chance between two ways to whiten some thousand readings
+    const Fit other = fit(problem_of(otherwise, motor), {});
+    return other.misfit < no_more * best.misfit && other.misfit < 0.25 * as_it_stands;
+  };
+  const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
+    return log.has(Role::current) && log.has(Role::speed) &&
+           std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(),
+                       [](double w) { return std::abs(w) > 0; });
+  });
+  if (turns && !problem.heated_by_power()) {
+    std::vector<Log> swapped = logs;
+    for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
+    if (explained_by(swapped))
+      return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
+             "swapped; map them with --column.";
+  }
+  // A column that is ever below 50 would be below 10 degC: no room where motors are measured.
+  const auto may_be_fahrenheit = [&](Role role) {
+    return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
+      return log.has(role) && std::none_of(log.of(role).begin(), log.of(role).end(), [](double x) { return x < 50; });
+    });
+  };
+  const Unit degF = *unit_named("degF");
+  const std::vector<Role> together[] = {{Role::housing}, {Role::core}, {Role::housing, Role::core}};
+  for (const std::vector<Role>& roles : together) {
+    if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit)) continue;
+    std::vector<Log> converted = logs;
+    std::string columns;
+    for (const Role role : roles) {
+      columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
+      for (Log& log : converted) {
+        for (double& reading : log.of(role)) reading = degF.factor * (reading + degF.offset);
+      }
+    }
+    if (explained_by(converted))
+      return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
+                         columns);
+  }
+  return "";
+}
+
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
@@ -187,20 +235,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
     }
     at += static_cast<Eigen::Index>(cause.parameters.size());
   }
-  // Where the temperatures follow the square of the speed column better than anything that follows the current.
-  const bool both = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
-    const auto turns = [](double w) { return std::abs(w) > 0; };
-    return log.has(Role::current) && log.has(Role::speed) &&
-           std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(), turns);
-  });
-  if (!both || problem.heated_by_power() || found.base.ratio < 2) return "";
-  std::vector<Log> swapped = logs;
-  for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
-  const Fit other = fit(problem_of(swapped, motor), {});
-  if (other.misfit < best.misfit && other.misfit < 0.25 * found.base.fit.misfit)
-    return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
-           "swapped; map them with --column.";
-  return "";
+  return found.base.ratio < 2 ? "" : misread_columns(problem, best, logs, motor);
 }
 
 /// Logs to be fitted or scored together must have the same kind of heat; what else only some of them hold is taken for

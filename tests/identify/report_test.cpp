@@ -251,6 +251,19 @@ TEST(BadInput, TwoClocksTwoMinutesApart) {
           "two clocks");
 }
 
+std::string fahrenheit(const std::string& degC) {
+  return degC.empty() ? "" : std::to_string(std::stod(degC) * 1.8 + 32);
+}
+
+TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), true; }),
+          "--column housing_degC=COLUMN:degF");
+  refused(spoilt([](auto& row, int) { return row[5] = fahrenheit(row[5]), true; }), "--column core_degC=COLUMN:degF");
+  refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), row[5] = fahrenheit(row[5]), true; }),
+          "--column housing_degC=COLUMN:degF --column core_degC=COLUMN:degF");
+}
+
 TEST(BadInput, CurrentAndSpeedSwapped) {
   refused(spoilt([](auto& row, int number) {
             row[2] = row[1];
