@@ -265,6 +265,7 @@ TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
 }
 
 TEST(BadInput, CurrentAndSpeedSwapped) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   refused(spoilt([](auto& row, int number) {
             row[2] = row[1];
             row[1] = number / 300 % 2 == 0 ? "0" : "2.5";
@@ -344,6 +345,7 @@ TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
 }
 
 TEST(MeasuredData, AFanMakesNoSessionTooShort) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const auto said = [&](const std::string& runs) { return run(runs + " --map " + maps + "tass.toml").out; };
   // The fan run determines its own time constant, about 420 s, and the session is longer; the still-air runs' is 2150
