@@ -172,15 +172,14 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
-/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors on the columns read otherwise leave no more
+/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors on the columns read otherwise leave less
 /// than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   const double as_it_stands = fit(problem, {}).misfit;
   const auto explained_by = [&](const std::vector<Log>& otherwise) {
-    constexpr double no_more = 1.02;  // chance between two ways to whiten some thousand readings
     const Fit other = fit(problem_of(otherwise, motor), {});
-    return other.misfit < no_more * best.misfit && other.misfit < 0.25 * as_it_stands;
+    return other.misfit < best.misfit && other.misfit < 0.25 * as_it_stands;
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
     return log.has(Role::current) && log.has(Role::speed) &&
