@@ -26,6 +26,7 @@ enum class Edit {
   sensor_lag,
   sensor_offset,
   sensor_gain,
+  sensor_share,  // parameter 0: how far towards the winding the housing sensor sits
   drift,
   delay,
   stall_share
@@ -56,7 +57,18 @@ struct Parameter {
   double none = 0;  // the value at which the cause does nothing
 };
 
-enum class Needs { nothing, current, speed, neighbour, frame, signed_current, several_logs, several_powers, copper };
+enum class Needs {
+  nothing,
+  current,
+  speed,
+  neighbour,
+  frame,
+  signed_current,
+  several_logs,
+  several_powers,
+  copper,
+  core
+};
 
 struct Cause {
   const char* id;
@@ -169,6 +181,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       break;
     case Edit::sensor_gain:
       set.housing.gain_error = k[0];
+      break;
+    case Edit::sensor_share:
+      model.sensor_share = k[0];
+      model.feels_winding = true;
       break;
     case Edit::drift:
       model.drift_K_per_s = k[0];

@@ -125,11 +125,7 @@ ColumnMap read_map(const std::string& path) {
     if (text.empty())
       throw UserError(Exit::usage,
                       fmt::format("{}: {}: write \"column\" or {{ column = \"...\", unit = \"rpm\" }}.", path, name));
-    try {
-      add_column(map, name + "=" + text);
-    } catch (const UserError& error) {
-      throw UserError(Exit::usage, path + ": " + error.what());
-    }
+    add_column(map, name + "=" + text, path + ": ");
   }
   return map;
 }

@@ -142,21 +142,24 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     const Physical p = physical(f.x);
     return p.R2_K_per_W * p.C2_J_per_K;
   };
+  const auto determines = [](const Problem& by, const Fit& f) {
+    const double inflation = std::max(1.0, std::sqrt(2 * f.misfit / std::max(1, f.readings)));
+    const auto lines = base_lines(by, f, inflation);
+    return lines[1].determined && lines[3].determined;
+  };
   double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
   for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
     Problem one = problem;
     one.logs = {problem.logs[l]};
     const Fit alone = fit(one, {});
-    if (alone.x.size() == 0) continue;
-    const double inflation = std::max(1.0, std::sqrt(2 * alone.misfit / std::max(1, alone.readings)));
-    const auto lines = base_lines(one, alone, inflation);
-    if (lines[1].determined && lines[3].determined) housing_s = std::min(housing_s, time_constant_s(alone));
+    if (alone.x.size() > 0 && determines(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
   }
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
   if (all < housing_s) {
-    return fmt::format("It lasts {:.0f} s, less than the housing's time constant of about {:.0f} s; record longer.",
-                       all, housing_s);
+    const bool known = problem.belief.known || determines(problem, base);
+    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
+                       known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
   return "";
 }

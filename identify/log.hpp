@@ -58,8 +58,8 @@ struct ColumnMap {
 /// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and an optional note.
 ColumnMap read_map(const std::string& path);
 
-/// Adds "role=column" or "role=column:unit" (command line) to a map.
-void add_column(ColumnMap& map, const std::string& text);
+/// Adds "role=column" or "role=column:unit" to a map; `from`: where it was said, for complaints.
+void add_column(ColumnMap& map, const std::string& text, const std::string& from = "--column ");
 
 struct Log {
   std::string name;

@@ -15,6 +15,7 @@ struct Model {
   int core = 0, housing = 1;
   int hot_node = -1;     // an end winding of its own; a core reading is then the mean of both by their copper
   double hot_share = 0;  // its part of the copper
+  int core_link = 0;     // winding to housing
   int sink_link = 1;     // housing to ambient or coolant
 
   S current_offset_A = S(0);  // true current = recorded + offset
@@ -23,7 +24,8 @@ struct Model {
   S stall_share = S(0);       // extra share of copper heat while the rotor stands
   S cooling_factor = S(1);    // of the sink conductance, from cooling_from_s on
   S cooling_from_s = S(0);
-  bool offset = false, delayed = false, drifts = false, stalls = false, cooling_changes = false;
+  S sensor_share = S(0);  // the housing sensor reads housing + share * (winding - housing)
+  bool offset = false, delayed = false, drifts = false, stalls = false, cooling_changes = false, feels_winding = false;
 };
 
 }  // namespace identify

@@ -19,11 +19,31 @@ std::string end_name(int end) {
                                        : fmt::format("\"{}\"", boundary_names[end - thermal::first_boundary]);
 }
 
+/// The board's sensor reads a node. Between winding and housing that is a thin one, which the heat passes through.
+void place_sensor(const Model<double>& m, thermal::HeatSet<double>& set) {
+  constexpr double thin = 0.02, least = 0.01;  // of the winding's capacity; a share of 0 is the housing, 1 the winding
+  if (m.sensor_share < least) return;
+  if (m.sensor_share > 1 - least) {
+    set.housing.node = static_cast<std::int8_t>(m.core);
+    return;
+  }
+  const int sensor = set.node_count++;
+  set.nodes[sensor] = {thin * set.nodes[m.core].capacity_J_per_K, {}};
+  set.nodes[m.core].capacity_J_per_K *= 1 - thin;
+  auto& way = set.links[m.core_link];
+  set.links[set.link_count++] = {static_cast<std::int8_t>(sensor), way.to, way.law,
+                                 way.conductance_W_per_K / m.sensor_share, way.k};
+  way.to = static_cast<std::int8_t>(sensor);
+  way.conductance_W_per_K /= 1 - m.sensor_share;
+  set.housing.node = way.to;
+}
+
 }  // namespace
 
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
   const Model<double> m = model_of(problem, f, 0);
   thermal::HeatSet<double> set = m.set;
+  place_sensor(m, set);
   for (int i = 0; i < set.node_count; ++i) {
     const bool winding = i == m.core || i == m.hot_node;
     set.nodes[i].max_degC =
@@ -53,10 +73,11 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   s += "format = 1\n";
   for (int i = 0; i < set.node_count; ++i) {
     s += fmt::format("\n[[node]]  # {}: {}\ncapacity_J_per_K = {:.6g}\n", i,
-                     i == m.core       ? "winding"
-                     : i == m.housing  ? "housing"
-                     : i == m.hot_node ? "hot spot"
-                                       : "further mass",
+                     i == m.core             ? "winding"
+                     : i == m.housing        ? "housing"
+                     : i == m.hot_node       ? "hot spot"
+                     : i == set.housing.node ? "where the sensor sits"
+                                             : "further mass",
                      set.nodes[i].capacity_J_per_K);
     if (std::isfinite(set.nodes[i].max_degC)) s += fmt::format("max_degC = {:g}\n", set.nodes[i].max_degC);
   }

@@ -132,11 +132,13 @@ void rough_search(Problem& whole) {
       if (f.cost >= least || f.x.size() == 0) continue;
       least = f.cost;
       best = b;
+      // A housing that answers at once is fitted best by both masses as one, and no motor is so. In catalogues R1 is
+      // 0.03..1.4 of R2 and C1 0.02..0.6 of C2 (maxon, of 5 to 200 W); three times as far is allowed either way.
       const Physical p = physical(f.x);
-      best.R1_K_per_W = p.R1_K_per_W;
       best.R2_K_per_W = p.R2_K_per_W;
-      best.C1_J_per_K = p.C1_J_per_K;
-      best.C2_J_per_K = p.C2_J_per_K;
+      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / 1.8);
+      best.R1_K_per_W = std::clamp(p.R1_K_per_W, 0.01 * p.R2_K_per_W, 4.2 * p.R2_K_per_W);
+      best.C1_J_per_K = std::clamp(p.C1_J_per_K, 0.007 * best.C2_J_per_K, 1.8 * best.C2_J_per_K);
     }
   }
   if (least < 1e300) whole.belief = best;
@@ -203,6 +205,8 @@ bool Problem::possible(const Cause& cause) const {
       return any([](const Bins& b) { return b.has_neighbour; });
     case Needs::frame:
       return any([](const Bins& b) { return b.has_frame; });
+    case Needs::core:
+      return any_core();
     case Needs::several_logs:
       return logs.size() > 1;
     case Needs::several_powers:

@@ -139,16 +139,21 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
     } else {
       next = network.step(transition, T, bin.input);
     }
-    S seen = T[housing] + (next[housing] - T[housing]) * static_cast<double>(bin.housing_at);
+    S before = T[housing], change = next[housing] - T[housing];
+    if (model.feels_winding) {
+      before += model.sensor_share * (T[model.core] - T[housing]);
+      change += model.sensor_share * (next[model.core] - T[model.core] - change);
+    }
+    S seen = before + change * static_cast<double>(bin.housing_at);
     if (lags) {
       // Behind a ramp a first-order sensor stays by slope times lag, and what it was off by before fades away; readings
       // that are spread over the bin see the mean of that.
-      const S behind = (next[housing] - T[housing]) * set.housing.lag_s / log.width_s;
-      const S off = lagged - T[housing] + behind;
+      const S behind = change * set.housing.lag_s / log.width_s;
+      const S off = lagged - before + behind;
       const double into_s = log.width_s * static_cast<double>(bin.housing_at);
       seen -= behind;
       seen += off * (bin.housing_n > 1 ? mean_keep : exp(-into_s / set.housing.lag_s));
-      lagged = next[housing] - behind + off * keep;
+      lagged = before + change - behind + off * keep;
     }
     seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);
     const auto read = [&](int node, const S& K_per_ahead) {

@@ -45,6 +45,7 @@ struct HiddenEffects {
   double sensor_lag_s = 0;
   double sensor_offset_K = 0;
   double sensor_gain = 0;    // y = T + g (T - 25)
+  double sensor_share = 0;   // the sensor is glued so that it feels the windings: T + share (T_winding - T)
   double clock_delay_s = 0;  // the heat follows the logged current and speed this much later
 
   // Outside the catalogue of identification: it must say "unknown" to these.

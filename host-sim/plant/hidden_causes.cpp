@@ -90,6 +90,7 @@ const std::vector<HiddenCause>& hidden_causes() {
       {"sensor_lag", true, false, 60, [](H& h, const S&, double x, Random&) { h.sensor_lag_s = 10 * x; }},
       {"sensor_offset", true, true, 100, [](H& h, const S&, double x, Random&) { h.sensor_offset_K = x; }},
       {"sensor_gain", true, true, 6, [](H& h, const S&, double x, Random&) { h.sensor_gain = 0.1 * x; }},
+      {"sensor_placement", true, false, 3, [](H& h, const S&, double x, Random&) { h.sensor_share = 0.3 * x; }},
       {"ambient_drift", true, true, 100,
        [](H& h, const S&, double x, Random&) { h.ambient_drift_K_per_s = 0.003 * x; }},
       {"clock_delay", true, false, 30, [](H& h, const S&, double x, Random&) { h.clock_delay_s = 2 * x; }},

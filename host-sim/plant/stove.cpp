@@ -64,8 +64,12 @@ double Stove::ohm_ratio(double copper_degC) const {
   return 1 + (d_.copper_coefficient_per_K + hidden_.copper_coefficient_per_K) * (copper_degC - 25);
 }
 
+double Stove::at_sensor_degC() const {
+  return T_degC_[housing] + hidden_.sensor_share * (winding_degC() - T_degC_[housing]);
+}
+
 double Stove::sensed_degC() const {
-  const double body_degC = hidden_.sensor_lag_s > 0 ? sensed_degC_ : T_degC_[housing];
+  const double body_degC = hidden_.sensor_lag_s > 0 ? sensed_degC_ : at_sensor_degC();
   return body_degC + hidden_.sensor_offset_K + hidden_.sensor_gain * (body_degC - 25);
 }
 
@@ -226,7 +230,7 @@ void Stove::advance(double h_s, const HeatDrive& drive) {
     outflow_J_ += part_s / 6 * (k1.out_W + 2 * k2.out_W + 2 * k3.out_W + k4.out_W);
   }
   if (hidden_.sensor_lag_s > 0)
-    sensed_degC_ += (T_degC_[housing] - sensed_degC_) * (1 - std::exp(-h_s / hidden_.sensor_lag_s));
+    sensed_degC_ += (at_sensor_degC() - sensed_degC_) * (1 - std::exp(-h_s / hidden_.sensor_lag_s));
   time_s_ += h_s;
 }
 

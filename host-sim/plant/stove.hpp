@@ -73,6 +73,7 @@ class Stove {
     double out_W;
   };
   Flow flow(const Vector& T_degC, const Vector& heat_W) const;
+  double at_sensor_degC() const;               // what the housing sensor is glued to
   double ohm_ratio(double copper_degC) const;  // of copper's resistance to that at 25 degC
   Vector place_heat(const HeatDrive& drive, double& hidden_W) const;
   void change_weather(double h_s);

@@ -113,6 +113,7 @@ TEST(ThermalBench, EachEffectMovesTheLogItsWay) {
       {"sensor_lag", {0, -1, 0}},
       {"sensor_offset", {0, 1, 0}},
       {"sensor_gain", {0, 1, 0}},
+      {"sensor_placement", {0, 1, 0}},
       {"ambient_drift", {1, 1, 0}},
       {"clock_delay", {-1, -1, 0}},
       {"latent_heat", {-1, -1, 0}},

@@ -123,6 +123,7 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "sensor_lag") x.sensor_lag_s = 20 * k;
   if (id == "sensor_offset") x.sensor_offset_K = 3 * a;
   if (id == "sensor_gain") x.sensor_gain = std::max(-0.35, std::min(0.35, 0.1 * a));
+  if (id == "sensor_placement") x.sensor_share = std::min(0.9, 0.3 * k);
   if (id == "ambient_drift") x.ambient_drift_K_per_s = 0.008 * a;
   if (id == "clock_delay") delay_s = std::min(50.0, 10 * k);
   if (id == "stall_imbalance") x.stall_imbalance = std::min(1.0, k), x.stall_below_rad_per_s = 1;
@@ -161,6 +162,7 @@ std::vector<double> in_words_of_the_table(const std::string& id, const HiddenEff
   if (id == "sensor_lag") return {x.sensor_lag_s};
   if (id == "sensor_offset") return {x.sensor_offset_K};
   if (id == "sensor_gain") return {x.sensor_gain};
+  if (id == "sensor_placement") return {x.sensor_share};
   if (id == "ambient_drift") return {x.ambient_drift_K_per_s};
   if (id == "clock_delay") return {delay_s};
   if (id == "stall_imbalance") return {x.stall_imbalance};
@@ -250,7 +252,8 @@ std::vector<std::string> hideable() {
           "sensor_gain",
           "ambient_drift",
           "clock_delay",
-          "stall_imbalance"};
+          "stall_imbalance",
+          "sensor_placement"};
 }
 
 std::vector<std::string> outside() {

@@ -84,6 +84,14 @@ TEST(Reader, UnitsOfMappedColumnsBecomeSi) {
   EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
 }
 
+TEST(Reader, AColumnMappedToOneRoleIsNotReadAsAnotherByItsOwnName) {
+  ColumnMap map;
+  identify::add_column(map, "core_degC=housing_degC");
+  const Log log = read(head + "0,1,20\n1,2,21\n", map)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::core)[1], 21);
+  EXPECT_FALSE(log.has(Role::housing));
+}
+
 TEST(Reader, EmptyCellsAreMissingValues) {
   const Log log = read("time_s,current_A,housing_degC,core_degC\n0,1,20,25\n1,1,,\n2,1,NaN,\n3,1,21,\n")[0];
   EXPECT_TRUE(std::isnan(log.of(Role::housing)[1]));

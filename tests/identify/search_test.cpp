@@ -11,12 +11,15 @@
 #include <sstream>
 
 #include "identify/baseline.hpp"
+#include "identify/discover.hpp"
 #include "identify/experiment.hpp"
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/slow_build.hpp"
+#include "thermal/network.hpp"
+#include "thermal/validate.hpp"
 
 namespace {
 
@@ -25,6 +28,7 @@ using identify::Problem, identify::Verdict;
 struct Hidden {
   identify::Problem problem;
   tests::HiddenLog log;
+  std::vector<identify::Log> logs;
 };
 
 Hidden hidden(const tests::HiddenLogOptions& o) {
@@ -32,11 +36,12 @@ Hidden hidden(const tests::HiddenLogOptions& o) {
       (std::filesystem::temp_directory_path() /
        (std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv"))
           .string();
-  Hidden out{{}, tests::make_hidden_log(o, path)};
+  Hidden out{{}, tests::make_hidden_log(o, path), {}};
   wire::pc::MotorFile sheet;
   sheet.motor = out.log.sheet;
   sheet.name = out.log.motor;
-  out.problem = identify::problem_of(identify::logs_of(identify::read_table(path), {}, out.log.sheet), sheet);
+  out.logs = identify::logs_of(identify::read_table(path), {}, out.log.sheet);
+  out.problem = identify::problem_of(out.logs, sheet);
   return out;
 }
 
@@ -120,6 +125,45 @@ TEST(Search, OneThreadAndSeveralGiveTheSameAnswerToTheLastDigit) {
     for (std::size_t i = 0; i < one.sets.size(); ++i) EXPECT_EQ(several.sets[i].fit.x, one.sets[i].fit.x) << i;
   }
   identify::most_threads = usual;
+}
+
+TEST(Search, ASensorOnTheStatorIsFoundAndTheBoardsSetPutsItThere) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({"sensor_placement"}, 4242);
+  const auto found = identify::search(log.problem);
+  ASSERT_EQ(found.verdict, Verdict::explained);
+  ASSERT_EQ(found.tied.front(), std::vector<std::string>{"sensor_placement"});
+  const auto share = identify::cause_lines(log.problem, found.chosen.fit, 0).front();
+  EXPECT_NEAR(share.value, log.log.parameters.at("sensor_placement").front(), 3 * share.std_error);
+
+  const auto set = identify::heat_set_of(log.problem, found.chosen.fit);
+  ASSERT_TRUE(thermal::validate(set, thermal::estimator_dt_s).ok());
+  thermal::HeatNetwork<double> network(set);
+  thermal::HeatInput<> input;
+  input[thermal::Drive::current_A2] = 4;
+  input[thermal::Boundary::ambient] = 20;
+  auto degC = thermal::HeatNetwork<double>::Vector::Constant(set.node_count, 20).eval();
+  const auto step = network.transition(10);
+  for (int i = 0; i < 30; ++i) degC = network.step(step, degC, input);
+  const double winding = degC[0], housing = degC[1], sensed = degC[set.housing.node];
+  ASSERT_GT(winding - housing, 1);
+  EXPECT_NEAR((sensed - housing) / (winding - housing), share.value, 0.01);
+}
+
+TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass) {
+  const Hidden log = hidden({.duty = tests::Duty::designed,
+                             .core = tests::Core::none,
+                             .seed = 10,
+                             .effects = {"sensor_placement"},
+                             .strength = 2});
+  const Problem blind = identify::problem_of(log.logs, {});
+  const auto base = identify::fit(blind, {});
+  const std::vector<identify::Chosen> same_class = {{identify::cause_named("board_heat"), -1}};
+  const double from_two_resistors = base.cost - identify::fit(blind, same_class, {&base}).cost;
+  const double from_belief = base.cost - identify::fit(blind, same_class).cost;
+  EXPECT_GT(from_belief, 3 * from_two_resistors);
+  EXPECT_GT(blind.belief.R1_K_per_W, 0.009 * blind.belief.R2_K_per_W);
+  EXPECT_GT(blind.belief.C1_J_per_K, 0.006 * blind.belief.C2_J_per_K);
 }
 
 TEST(Experiment, StaysWithinTheMotorsLimits) {
@@ -248,7 +292,7 @@ TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
         "radiation",          "cooling_change",       "third_mass",     "hot_spot",        "neighbour_heat",
         "frame_conduction",   "board_heat",           "current_offset", "sensor_lag",      "sensor_offset",
         "sensor_gain",        "ambient_drift",        "clock_delay",    "stall_imbalance", "windage",
-        "power_share"}) {
+        "power_share",        "sensor_placement"}) {
     EXPECT_GE(identify::cause_named(id), 0) << id;
   }
 }
