@@ -89,28 +89,35 @@ std::string unusual_in(const Bins& log, std::size_t from, std::size_t to, const 
   return from < n / 10 ? "the start" : to > n * 9 / 10 ? "the end" : "none of the signals";
 }
 
-/// Appends the stretches of log `l` where the residual's running mean stays beyond `noise_K` on one side.
-void find_wrong(const Problem& problem, int l, const char* channel, const std::vector<double>& residual, double noise_K,
-                const std::vector<Signal>& all, std::vector<Wrong>& out) {
+/// Appends the stretches of log `l` where the residual's running mean stays on one side, beyond `slow_K` and what white
+/// noise of `white_K` a reading leaves in it.
+void find_wrong(const Problem& problem, int l, const char* channel, const std::vector<double>& residual, double slow_K,
+                double white_K, const std::vector<Signal>& all, std::vector<Wrong>& out) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
   const std::size_t n = residual.size();
-  // Running means over 1/60 of the log but at least half a minute: finer detail is noise to the eye.
-  const auto half = static_cast<std::size_t>(std::max(15.0, log.duration_s() / 120) / log.width_s) + 1;
   std::vector<double> sum(n + 1, 0), count(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
     sum[i + 1] = sum[i] + (std::isnan(residual[i]) ? 0 : residual[i]);
     count[i + 1] = count[i] + (std::isnan(residual[i]) ? 0 : 1);
   }
+  // Running means over 1/60 of the log but at least half a minute and some readings: finer detail is noise to the eye.
+  constexpr double least_readings = 9;
+  const double width = std::max(std::max(30.0, log.duration_s() / 60) / log.width_s,
+                                least_readings * static_cast<double>(n) / std::max(count[n], 1.0));
+  const auto half = static_cast<std::size_t>(width / 2) + 1;
+  const auto readings = [&](std::size_t from, std::size_t to) { return count[to] - count[from]; };
   const auto mean = [&](std::size_t from, std::size_t to) {
-    return count[to] > count[from] ? (sum[to] - sum[from]) / (count[to] - count[from]) : 0;
+    return readings(from, to) > 0 ? (sum[to] - sum[from]) / readings(from, to) : 0;
   };
   int sign = 0;
   std::size_t start = 0;
   for (std::size_t i = 0; i <= n; ++i) {
-    const double m = i < n ? mean(i > half ? i - half : 0, std::min(n, i + half)) : 0;
+    const std::size_t from = i > half ? i - half : 0, to = std::min(n, i + half);
+    const double m = i < n ? mean(from, to) : 0;
+    const double noise_K = std::hypot(slow_K, 3 * white_K / std::sqrt(std::max(1.0, readings(from, to))));
     const int now = m > noise_K ? 1 : m < -noise_K ? -1 : 0;
     if (now == sign) continue;
-    if (sign != 0)
+    if (sign * mean(start, i) > slow_K)
       out.push_back({l, channel, static_cast<double>(start) * log.width_s, static_cast<double>(i) * log.width_s,
                      mean(start, i), unusual_in(log, start, i, all)});
     sign = now;
@@ -193,12 +200,13 @@ Structure structure(const Problem& problem, const Fit& f) {
       append(fast[s], smoothed(v, log.width_s / (30 + log.width_s)));
       append(slow[s], smoothed(v, log.width_s / (300 + log.width_s)));
     }
-    const double threshold = std::max(0.1, 3 * problem.noise.housing_slow_K);
+    const double slow_K = std::max(0.1, 3 * problem.noise.housing_slow_K);
     if (log.has_housing)
-      find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, threshold, all, out.wrong);
+      find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, slow_K, problem.noise.housing_white_K,
+                 all, out.wrong);
     if (log.has_core)
-      find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K,
-                 std::max(3 * threshold, 0.7 * problem.noise.core_white_K), all, out.wrong);
+      find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K, 3 * slow_K, problem.noise.core_white_K,
+                 all, out.wrong);
   }
   if (!problem.logs.front().has_housing) {
     whitened.clear();

@@ -166,6 +166,29 @@ Fit with_lag(const Fit& base, double lag_s) {
   return late;
 }
 
+TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorOfOneReadingsNoiseIs) {
+  int of_noise = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const Problem problem = problem_from(off_sheet(seed));
+    const auto s = identify::structure(problem, identify::fit(problem, {}));
+    of_noise += static_cast<int>(s.wrong.size());
+  }
+  EXPECT_LE(of_noise, 1);  // eight a log, where single readings were held against a threshold
+
+  Problem problem = problem_from(off_sheet(1));
+  const Fit f = identify::fit(problem, {});
+  const double width_s = problem.logs[0].width_s;
+  for (identify::Bin& bin : problem.logs[0].bins) {
+    const double t = width_s * static_cast<double>(&bin - problem.logs[0].bins.data());
+    if (t > 300 && t < 700) bin.core_degC += 3;
+  }
+  const auto s = identify::structure(problem, f);
+  ASSERT_EQ(s.wrong.size(), 1u);
+  EXPECT_NEAR(s.wrong[0].from_s, 300, 60);
+  EXPECT_NEAR(s.wrong[0].to_s, 700, 60);
+  EXPECT_NEAR(s.wrong[0].mean_K, 3, 1);
+}
+
 TEST(Fit, ALagOfNothingChangesNothing) {
   const Problem problem = problem_from(off_sheet(9));
   const Fit base = identify::fit(problem, {});
