@@ -75,6 +75,8 @@ Values parameters_of_model(const std::string& path, std::string& why) {
     return list != nullptr ? *list : toml::array{};
   };
   const toml::array nodes = array("node"), links = array("link"), sources = array("source");
+  if (file.at_path("housing_sensor.node").value_or(1) != 1)
+    return why = "a housing sensor towards the winding", Values{};
   if (nodes.size() != 2) return why = "a further mass or a hot spot", Values{};
   Values found;
   const auto put = [&](const char* name, double value) { found[name] = static_cast<float>(value); };

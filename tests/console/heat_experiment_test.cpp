@@ -102,6 +102,7 @@ TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
   refused(two_resistors + "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.1\n",
           "radiation");
   refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n", "gain");
+  refused(two_resistors + "[housing_sensor]\nnode = 0\n", "towards the winding");
 }
 
 nlohmann::json answer(double miss_K, bool determined) {
