@@ -391,6 +391,8 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
       return {{3}, {30}, {75}};
     case Edit::delay:  // s
       return {{2}, {20}, {-10}};
+    case Edit::sensor_share:
+      return {{0.05}, {0.6}};
     case Edit::mass:
     case Edit::hot_spot:  // ln of capacity and resistance: the time constant goes by half of what the capacity goes
       for (const double shift : {0.0, -2.0}) out.push_back({nothing + shift, c[at + 1].start - shift / 2});

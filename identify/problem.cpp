@@ -205,8 +205,6 @@ bool Problem::possible(const Cause& cause) const {
       return any([](const Bins& b) { return b.has_neighbour; });
     case Needs::frame:
       return any([](const Bins& b) { return b.has_frame; });
-    case Needs::core:
-      return any_core();
     case Needs::several_logs:
       return logs.size() > 1;
     case Needs::several_powers:

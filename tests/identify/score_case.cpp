@@ -177,9 +177,6 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   const auto logs = read(log, path);
   CaseResult result;
   result.truth = options.log.effects;
-  // Without a winding temperature a sensor that feels the winding is of the class of the housing's direct heat.
-  if (options.log.core == Core::none)
-    std::replace(result.truth.begin(), result.truth.end(), std::string("sensor_placement"), std::string("board_heat"));
   std::sort(result.truth.begin(), result.truth.end());
   const std::clock_t start = std::clock();
   Problem problem = identify::problem_of(logs, sheet_of(log));

@@ -158,9 +158,10 @@ TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass)
                              .strength = 2});
   const Problem blind = identify::problem_of(log.logs, {});
   const auto base = identify::fit(blind, {});
-  const std::vector<identify::Chosen> same_class = {{identify::cause_named("board_heat"), -1}};
-  const double from_two_resistors = base.cost - identify::fit(blind, same_class, {&base}).cost;
-  const double from_belief = base.cost - identify::fit(blind, same_class).cost;
+  // Without a winding temperature the same as the hidden one, but starting from one place only.
+  const std::vector<identify::Chosen> alike = {{identify::cause_named("board_heat"), -1}};
+  const double from_two_resistors = base.cost - identify::fit(blind, alike, {&base}).cost;
+  const double from_belief = base.cost - identify::fit(blind, alike).cost;
   EXPECT_GT(from_belief, 3 * from_two_resistors);
   EXPECT_GT(blind.belief.R1_K_per_W, 0.009 * blind.belief.R2_K_per_W);
   EXPECT_GT(blind.belief.C1_J_per_K, 0.006 * blind.belief.C2_J_per_K);
