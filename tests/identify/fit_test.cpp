@@ -166,7 +166,7 @@ Fit with_lag(const Fit& base, double lag_s) {
   return late;
 }
 
-TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorOfOneReadingsNoiseIs) {
+TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorThatLastsIs) {
   int of_noise = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const Problem problem = problem_from(off_sheet(seed));
