@@ -67,10 +67,18 @@ answers("verdict;changes" ${hotcore} identify --minutes 1 --out i)
 answers("rule;install" ${BIN}/hotcore --json udev)
 answers("boards;lost" ${BIN}/many_boards 2 0.1 --json)
 answers("fit_ms" ${BIN}/fit_speed --json --short)
-# They serve until Ctrl-C: the line must have come before.
-answers("serial;bus_id;port" timeout --preserve-status -s INT 3 ${BIN}/virtual-board --port 0 --serial JSON1 --json)
+# They serve until Ctrl-C, which comes once they have said where (a minute is far more than the slowest build takes).
+set(interrupted sh -c [=[
+  rm -f served
+  "$@" > served &
+  tenths=0
+  while [ ! -s served ] && [ $tenths -lt 600 ]
+  do sleep 0.1 && tenths=$((tenths + 1))
+  done
+  kill -INT $! && wait $! && cat served]=] sh)
+answers("serial;bus_id;port" ${interrupted} ${BIN}/virtual-board --port 0 --serial JSON1 --json)
 if(EXISTS ${IMAGE})
-  answers("serial;bus_id;port" timeout --preserve-status -s INT 5 ${BIN}/virtual-board --chip --image ${IMAGE} --port 0 --json)
+  answers("serial;bus_id;port" ${interrupted} ${BIN}/virtual-board --chip --image ${IMAGE} --port 0 --json)
   answers("chip" ${BIN}/chip jump --image ${IMAGE} --set seconds=0.05 --json)
 endif()
 

@@ -302,6 +302,9 @@ volatile std::sig_atomic_t interrupted = 0, power_cut = 0;
 
 int serve_until_interrupted(Device& device, std::uint16_t port, bool json) {
   Server server(device, port);
+  // Before it says that it serves: who reads that may interrupt at once.
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
+  std::signal(SIGHUP, [](int) { power_cut = 1; });
   const std::string attach =
       fmt::format("modprobe vhci-hcd && usbip --tcp-port {} attach -r 127.0.0.1 -b {}", server.port(), bus_id);
   if (json) {
@@ -318,8 +321,6 @@ int serve_until_interrupted(Device& device, std::uint16_t port, bool json) {
         server.serial(), server.port(), attach);
   }
   std::fflush(stdout);
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
-  std::signal(SIGHUP, [](int) { power_cut = 1; });
   server.serve([&] {
     if (power_cut != 0) device.power_cycle();
     power_cut = 0;
