@@ -122,6 +122,7 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
 }
 
 TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions one, other;
   for (auto* o : {&one, &other}) o->core_every_s = 2;
   one.power_gain = 1;
@@ -242,6 +243,7 @@ TEST(BadInput, FortyPercentMissing) {
 }
 
 TEST(BadInput, TwoClocksTwoMinutesApart) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   std::vector<std::string> earlier;
   refused(spoilt([&](auto& row, int number) {
             earlier.push_back(row[1]);
@@ -275,6 +277,7 @@ TEST(BadInput, CurrentAndSpeedSwapped) {
 }
 
 TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.core_every_s = 20;
   options.seconds = 600;
