@@ -328,7 +328,9 @@ void fit_pairs(const Problem& problem, Field& field) {
 /// of a kelvin that its sensor wanders by outvotes a winding read twice a minute: of a motor recorded in host-sim
 /// (gain, seed 503) C1 came out 13 percent too large with a standard error of 3; from a winding read all the time it
 /// is 1.
-constexpr double unmodelled_share = 0.002, unmodelled_s = 240;
+constexpr double unmodelled_share = 0.001, unmodelled_s = 240;
+/// A further cause must be worth it where the model may be off by twice that.
+constexpr double doubted = 2;
 
 double housing_range_K(const Problem& problem) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -340,9 +342,9 @@ double housing_range_K(const Problem& problem) {
   return std::max(0.0, high - low);
 }
 
-/// The same readings, the housing believed no closer than a model of a few nodes can be right.
-Problem believed_less(Problem problem) {
-  const double unmodelled_K = unmodelled_share * housing_range_K(problem);
+/// The same readings, the housing believed no closer than `times` what no model follows.
+Problem believed_less(Problem problem, double times) {
+  const double unmodelled_K = times * unmodelled_share * housing_range_K(problem);
   if (problem.noise.disturbance_K < unmodelled_K) {
     problem.noise.disturbance_K = unmodelled_K;
     problem.noise.disturbance_s = unmodelled_s;
@@ -370,7 +372,7 @@ std::string why_no_pair(const Problem& problem, const Field& field, const Margin
   if (!(more > nameless + margins.second))
     return fmt::format("{} would gain {:.1f} more than {}, a slow disturbance without a name {:.1f}: stopped there.",
                        both, more, first, nameless);
-  const Problem less = believed_less(problem);
+  const Problem less = believed_less(problem, doubted);
   const double still =
       fit(less, single.fit.chosen, {&single.fit}).surprise() - fit(less, pair.fit.chosen, {&pair.fit}).surprise();
   if (!(still > margins.second))
@@ -556,7 +558,7 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
 /// that was judged by and no closer than such a model can be right.
 void refit_for_the_board(Problem judged, Search& out) {
   judged.lateness_K.clear();
-  judged = believed_less(std::move(judged));
+  judged = believed_less(std::move(judged), 1);
   const auto refit = [&](Fit& f) { f = fit(judged, f.chosen, {&f}); };
   refit(out.base.fit);
   refit(out.chosen.fit);
