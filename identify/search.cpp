@@ -559,7 +559,12 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
 void refit_for_the_board(Problem judged, Search& out) {
   judged.lateness_K.clear();
   judged = believed_less(std::move(judged), 1);
-  const auto refit = [&](Fit& f) { f = fit(judged, f.chosen, {&f}); };
+  // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
+  const auto refit = [&](Fit& f) {
+    Fit anew = fit(judged, f.chosen);
+    f = fit(judged, f.chosen, {&f});
+    if (anew.x.size() > 0 && (f.x.size() == 0 || anew.cost < f.cost)) f = std::move(anew);
+  };
   refit(out.base.fit);
   refit(out.chosen.fit);
   for (Candidate& c : out.sets) {
