@@ -90,14 +90,14 @@ int main(int argc, char** argv) {
   const std::string folder =
       (std::filesystem::temp_directory_path() / fmt::format("hotcore_gain_{}", getpid())).string();
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  int missed = 0, helped = 0, harmed = 0, hot = 0;
+  int missed = 0, helped = 0, harmed = 0, too_hot = 0;
   for (int s = 0; s < seeds; ++s) {
     const Case c = played(options, first + static_cast<std::uint64_t>(s), folder);
     missed += !c.before.kept();
     helped += !c.before.kept() && c.after.kept();
     const bool hotter = c.after.overshoot_K > std::max(most_overshoot_K, c.before.overshoot_K);
     harmed += (c.before.kept() && !c.after.kept()) || hotter;
-    hot += c.answer.starts_with("explained") && c.after.overshoot_K > most_overshoot_K;
+    too_hot += c.answer.starts_with("explained") && c.after.overshoot_K > most_overshoot_K;
     list.push_back({{"seed", c.seed},
                     {"truth", c.truth},
                     {"answer", c.answer},
@@ -112,13 +112,15 @@ int main(int argc, char** argv) {
     fmt::print("{}\n", nlohmann::ordered_json{{"missed_by_two_resistors", missed},
                                               {"helped", helped},
                                               {"harmed", harmed},
-                                              {"named_and_too_hot", hot},
+                                              {"named_and_too_hot", too_hot},
                                               {"cases", list}}
                            .dump(2));
   else
     fmt::print(
         "{} motors; two resistors, fitted, miss {} (overshoot above {:g} K or less than {:g} % of the burst); the "
-        "model found puts {} of these right and spoils {} of the others; {} that were named pass the limit by more\n",
-        seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed, hot);
-  return check && harmed + hot > 0 ? 1 : 0;
+        "model found puts {} of these right and spoils {} of the others; {} with a cause named pass the limit by more "
+        "than "
+        "{:g} K\n",
+        seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed, too_hot, most_overshoot_K);
+  return check && harmed + too_hot > 0 ? 1 : 0;
 }
