@@ -21,9 +21,6 @@ namespace {
 constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
-/// Times the noise that two resistors leave: from there on they are bent so far that causes start from the sheet as
-/// well.
-constexpr double far_off = 1.5;
 constexpr std::size_t least_look_bins = 6000;  // of twice as many, looks see every two as one
 constexpr double least_slow_K = 0.02;          // below it a thermistor's slow noise hides behind its steps
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
@@ -169,7 +166,8 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
   }
 }
 
-/// Every cause alone, best first.
+/// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
+/// into a poor valley by what is missing.
 std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
                                   const std::vector<Candidate>& before) {
   std::vector<Fit> fits(all.size());
@@ -178,7 +176,6 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const Candidate& b) { return b.fit.chosen == alone; });
     fits[i] = fit(problem, alone, {known == before.end() ? &base.fit : &known->fit});
-    if (known != before.end() || base.ratio < far_off) return;
     Fit anew = fit(problem, alone);
     if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
   });
