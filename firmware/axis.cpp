@@ -305,16 +305,17 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
     // Ripple that sampling in the zero vector cannot see, from the last duty; half of its square in each phase.
     const float ripple_A2 = enabled * thermal::ripple_A2(last_.ratio, trace_.bus_V, inductance_H_, pwm_Hz_);
     const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
-    double vector_A2 = 0.0;
+    double sampled_A2 = 0.0, vector_A2 = 0.0;
     for (int k = 0; k < 3; ++k) {
       const double one_A2 = static_cast<double>(phase_A2[k] + 0.5f * ripple_A2);
       input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;
+      sampled_A2 += static_cast<double>(phase_A2[k]) / 1.5;
       vector_A2 += one_A2 / 1.5;
     }
     input[thermal::Drive::current_A2] = vector_A2;
-    input[thermal::Drive::current_A] = std::sqrt(vector_A2);
+    input[thermal::Drive::current_A] = std::sqrt(sampled_A2);
     input[thermal::Drive::enabled] = static_cast<double>(enabled);
-    thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()), vector_A2);
+    thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }
   input[thermal::Drive::one] = 1.0;
   // Nobody measures these here: as warm as the surroundings are believed to be.

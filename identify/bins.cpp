@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "identify/median.hpp"
 #include "wire/pc/user_error.hpp"
@@ -17,6 +18,8 @@ using thermal::Drive;
 
 /// 36,000 take a search 8 to 17 s on one core (README), so these a minute and a half at most.
 constexpr double most_bins = 200000;
+/// A current without its ripple is smaller than with it, but for what two sensors differ by.
+constexpr double most_over = 1.1;
 
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 
@@ -55,23 +58,39 @@ double reading_noise(const std::vector<double>& v) {
 }
 
 struct Inputs {
-  std::vector<double> amplitude_A, signed_A, power_W, speed_rad_per_s, boundary_degC[thermal::boundary_count];
+  std::vector<double> amplitude_A, sampled_A, power_W, speed_rad_per_s, boundary_degC[thermal::boundary_count];
 };
+
+/// Length of the current vector with the sign of its torque, from iq_A and, where it is there, id_A.
+std::vector<double> sampled_A(const Log& log) {
+  const auto& t = log.of(Role::time);
+  std::vector<double> out = bridged(log.of(Role::iq), t);
+  if (!log.has(Role::id)) return out;
+  const std::vector<double> id_A = bridged(log.of(Role::id), t);
+  for (std::size_t k = 0; k < t.size(); ++k) out[k] = std::copysign(std::hypot(id_A[k], out[k]), out[k]);
+  return out;
+}
+
+double square(const std::vector<double>& v) { return std::inner_product(v.begin(), v.end(), v.begin(), 0.0); }
 
 Inputs inputs_of(const Log& log, Bins& out) {
   const auto& t = log.of(Role::time);
   Inputs in;
   if (log.has(Role::current)) {
-    in.signed_A = bridged(log.of(Role::current), t);
-    for (double& i : in.signed_A) i *= amplitude_per_direct;
-    in.amplitude_A = in.signed_A;
-    for (double& i : in.amplitude_A) i = std::abs(i);
-  } else if (log.has(Role::iq) && log.has(Role::id)) {
-    in.signed_A = bridged(log.of(Role::iq), t);
-    in.amplitude_A = bridged(log.of(Role::id), t);
-    for (std::size_t k = 0; k < t.size(); ++k) in.amplitude_A[k] = std::hypot(in.amplitude_A[k], in.signed_A[k]);
+    in.amplitude_A = bridged(log.of(Role::current), t);
+    for (double& i : in.amplitude_A) i *= amplitude_per_direct;
+    in.sampled_A = in.amplitude_A;
+    if (log.has(Role::iq)) {
+      std::vector<double> sampled = sampled_A(log);
+      if (square(sampled) <= most_over * most_over * square(in.amplitude_A))
+        in.sampled_A = std::move(sampled);
+      else
+        out.notes.push_back(
+            "iq_A (an amplitude) carries more than current_A (direct) allows and is not used; check both units.");
+    }
   } else {
-    in.signed_A = in.amplitude_A = std::vector<double>(t.size(), 0.0);
+    in.amplitude_A = in.sampled_A =
+        log.has(Role::iq) && log.has(Role::id) ? sampled_A(log) : std::vector<double>(t.size(), 0.0);
   }
   out.has_power = log.has(Role::power);
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
@@ -159,7 +178,7 @@ void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const I
       const double share = std::max(0.0, to - from) / out.width_s;
       Bin& bin = out.bins[b];
       covered[b] += share;
-      add_moment(bin, share, in.signed_A[i], in.amplitude_A[i], in.speed_rad_per_s[i]);
+      add_moment(bin, share, in.amplitude_A[i], in.sampled_A[i], in.speed_rad_per_s[i]);
       bin.input[Drive::power_W] += share * in.power_W[i];
       for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary_degC[s][i];
       from = to;
@@ -191,8 +210,8 @@ void find_idle(Bins& out) {
 
 }  // namespace
 
-void add_moment(Bin& bin, double share, double signed_A, double amplitude_A, double speed_rad_per_s) {
-  const double a = amplitude_A, w = std::abs(speed_rad_per_s), a2 = a * a;
+void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, double speed_rad_per_s) {
+  const double a = std::abs(sampled_A), w = std::abs(speed_rad_per_s), a2 = amplitude_A * amplitude_A;
   thermal::HeatInput<>& in = bin.input;
   in[Drive::one] += share;
   in[Drive::current_A2] += share * a2;
@@ -202,9 +221,9 @@ void add_moment(Bin& bin, double share, double signed_A, double amplitude_A, dou
   in[Drive::speed3_rad3_per_s3] += share * w * w * w;
   in[Drive::current2_speed2] += share * a2 * w * w;
   in[Drive::current_speed] += share * a * w;
-  in[Drive::enabled] += share * (a > 0 || w > 0 ? 1 : 0);
+  in[Drive::enabled] += share * (a2 > 0 || w > 0 ? 1 : 0);
   in[Drive::speed_to_0_8] += share * (w > 0 ? std::pow(w, 0.8) : 0);
-  bin.signed_A += share * signed_A;
+  bin.signed_A += share * sampled_A;
   bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
 }
 

@@ -6,7 +6,8 @@
 // next (zero-order hold), so that a bin that is as long as the sampling interval loses nothing.
 //
 // Current is the amplitude of the current vector: heat = 3/2 R_phase i^2. A current_A column is the direct current that
-// heats alike through two terminals, so i = 2/sqrt(3) times it (wire/motor.hpp).
+// heats alike through two terminals, so i = 2/sqrt(3) times it (wire/motor.hpp). It holds the ripple of the pulses,
+// which makes heat and no torque: where iq_A is there too, what goes with |i| or its sign is taken from that.
 #pragma once
 
 #include <cmath>
@@ -52,8 +53,9 @@ struct Bins {
 /// UserError (unusable) when the rows are too few, or share their times.
 Bins bins_of(const Log& log, double finest_s);
 
-/// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. Speed mechanical.
-void add_moment(Bin& bin, double share, double signed_A, double amplitude_A, double speed_rad_per_s);
+/// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. `sampled_A`: amplitude
+/// with the sign of its torque, without ripple where that is known. Speed mechanical.
+void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, double speed_rad_per_s);
 
 /// Every `together` bins as one.
 Bins merged(const Bins& log, std::size_t together);

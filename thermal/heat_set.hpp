@@ -28,13 +28,13 @@ enum class Drive : std::uint8_t {
   phase_a_A2,  // square of the current in one phase
   phase_b_A2,
   phase_c_A2,
-  current_A2,       // squared amplitude of the current vector, id^2 + iq^2
-  current_A,        // amplitude
+  current_A2,  // squared amplitude of the current vector, id^2 + iq^2, PWM ripple included: what resistance heats by
+  current_A,   // amplitude without the ripple: what torque, and so friction, goes by
   speed_rad_per_s,  // |mechanical speed|
   speed2_rad2_per_s2,
   speed3_rad3_per_s3,
   current2_speed2,  // |i|^2 w^2
-  current_speed,    // |i| |w|
+  current_speed,    // |i| |w|, without the ripple
   enabled,          // share of the time the bridge switched
   power_W,          // heat known from elsewhere: measured, or from bus power (sensor set B)
   speed_to_0_8,     // mean of |w|^0.8, for forced convection

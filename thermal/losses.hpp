@@ -65,14 +65,15 @@ inline float bus_power_W(float depth, float bus_V, float bus_A, float Ke_Vs, flo
   return power_W < 0.0f ? 0.0f : power_W;  // NaN stays NaN: the estimator replaces it by something hot
 }
 
-/// Fills every drive that holds speed, from the means of |w| and |i|^2 over one step (10 ms is short against both).
-inline void set_speed(HeatInput<>& input, double speed_rad_per_s, double current2_A2) {
+/// Fills every drive that holds speed, from the mean of |w| over one step and the currents that the input holds already
+/// (10 ms is short against both).
+inline void set_speed(HeatInput<>& input, double speed_rad_per_s) {
   const double w = std::abs(speed_rad_per_s);
   input[Drive::speed_rad_per_s] = w;
   input[Drive::speed2_rad2_per_s2] = w * w;
   input[Drive::speed3_rad3_per_s3] = w * w * w;
-  input[Drive::current2_speed2] = current2_A2 * w * w;
-  input[Drive::current_speed] = std::sqrt(current2_A2) * w;
+  input[Drive::current2_speed2] = input[Drive::current_A2] * w * w;
+  input[Drive::current_speed] = input[Drive::current_A] * w;
   input[Drive::speed_to_0_8] = std::pow(w, 0.8);
 }
 

@@ -188,16 +188,17 @@ Recording record(const RecordOptions& options) {
   std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation,
                                 file.name, file.surrogate ? " (surrogate)" : "", options.seed);
   csv += fmt::format(
-      "# current_A: direct current through two terminals that heats alike, PWM ripple included; core_degC: {}\n"
+      "# current_A: direct current through two terminals that heats alike, PWM ripple included; iq_A: torque current, "
+      "amplitude; core_degC: {}\n"
       "# current, speed and bus: means over the interval that begins at time_s\n",
       options.thermocouple ? "thermocouple, +-0.2 K" : "from winding resistance, +-2 K, every 30 s");
-  csv += "time_s,current_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
+  csv += "time_s,current_A,iq_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";
   double due_s = 0;
   for (std::size_t i = 1; i < trace.rows.size(); ++i) {
     // A row of the trace holds means over the interval that ends with it: they belong to the temperatures before.
     const Row &row = trace.rows[i - 1], &next = trace.rows[i];
-    csv += fmt::format("{:.2f},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, next.current_A,
-                       next.speed_rad_per_s, next.bus_V, next.bus_A, row.housing_degC, row.ambient_degC);
+    csv += fmt::format("{:.2f},{:.5g},{:.5g},{:.6g},{:.4f},{:.4g},{:.2f},{:.2f},", row.time_s, next.current_A,
+                       next.iq_A, next.speed_rad_per_s, next.bus_V, next.bus_A, row.housing_degC, row.ambient_degC);
     if (options.thermocouple)
       csv += fmt::format("{:.2f}", row.true_winding_degC + thermocouple_K * noise.gauss());
     else if (row.time_s >= due_s)

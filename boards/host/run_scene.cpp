@@ -82,6 +82,7 @@ class Sums {
   }
   void write(Row& row) {
     const double n = std::max(count_, 1);
+    row.iq_A = torque_current_A_ / n;
     row.current_A = std::copysign(root_3_over_2 * std::sqrt(square_A2_ / n), torque_current_A_);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
@@ -251,8 +252,8 @@ Row Board::row(int axis, double time_s, double demand) const {
   row.time_s = time_s;
   row.demand_A = demand;
   row.allowance_A = static_cast<double>(state.allowance_A);
-  row.id_A = static_cast<double>(fast.current_A.d);
-  row.iq_A = static_cast<double>(fast.current_A.q);
+  row.id_now_A = static_cast<double>(fast.current_A.d);
+  row.iq_now_A = static_cast<double>(fast.current_A.q);
   row.bus_A = static_cast<double>(slow_sample(bench_.board_raw(), design_.sensors).bus_A);
   row.depth_ratio = modulation_depth(doors_[axis].next());
   row.estimated_core_degC = hottest_degC(state);

@@ -22,8 +22,9 @@ constexpr Column columns[] = {
     {"time_s", &Row::time_s},
     {"demand_A", &Row::demand_A},
     {"allowance_A", &Row::allowance_A},
-    {"id_now_A", &Row::id_A},
-    {"iq_now_A", &Row::iq_A},
+    {"id_now_A", &Row::id_now_A},
+    {"iq_now_A", &Row::iq_now_A},
+    {"iq_A", &Row::iq_A},
     {"current_A", &Row::current_A},
     {"speed_rad_per_s", &Row::speed_rad_per_s},
     {"torque_Nm", &Row::torque_Nm},
@@ -156,7 +157,7 @@ void draw(const Result& result, const std::string& path) {
     return curves;
   };
 
-  Panel current{"current, A", all(&Row::iq_A, true)};
+  Panel current{"current, A", all(&Row::iq_now_A, true)};
   Curve asked = curve(0, &Row::demand_A, "asked for");
   asked.colour = "#909090";
   asked.dashed = true;

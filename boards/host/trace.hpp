@@ -14,9 +14,10 @@ namespace boards::host {
 /// One line of a log. Electrical values are means over the log interval unless said otherwise.
 struct Row {
   double time_s;
-  double demand_A;     // amplitude asked for
-  double allowance_A;  // amplitude the firmware allowed
-  double id_A, iq_A;   // at the end of the interval
+  double demand_A;            // amplitude asked for
+  double allowance_A;         // amplitude the firmware allowed
+  double id_now_A, iq_now_A;  // at the end of the interval
+  double iq_A;
   double current_A;  // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM
                      // ripple that sampling cannot see, signed like iq
   double speed_rad_per_s;

@@ -23,8 +23,8 @@ struct HeatDrive {
   std::array<double, 3> copper_W{};  // per phase, at its present resistance
   double iron_W = 0;
   double friction_W = 0;
-  double current_A = 0;        // mean |I| of the current vector
-  double current2_A2 = 0;      // mean I^2
+  double current_A = 0;    // mean |I| of the current vector, without the ripple of the pulses, which makes no torque
+  double current2_A2 = 0;  // mean I^2, with it
   double speed_rad_per_s = 0;  // |w|
   bool enabled = true;
 };

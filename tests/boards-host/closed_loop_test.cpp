@@ -97,7 +97,7 @@ TEST(ClosedLoop, GetUpComesDownSmoothlyWhereTheHardCutDropsTheRobot) {
   EXPECT_GT(least_A, 8) << "what the winding can hold at 300 rad/s is about 9 A";
   bool fell = false;
   for (const Row& row : result.traces[1].rows)
-    fell = fell || (row.demand_A > 0 && std::abs(row.iq_A) < 1 && row.time_s > 0.5);
+    fell = fell || (row.demand_A > 0 && std::abs(row.iq_now_A) < 1 && row.time_s > 0.5);
   EXPECT_TRUE(fell) << "the paper's cut takes all current away";
 }
 
