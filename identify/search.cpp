@@ -502,17 +502,19 @@ struct Left {
 };
 
 /// What two parts of the logs, each fitted for itself, gain over one fit of all, at the cut where they gain most. A set
-/// of the right form wants the same parameters in both (Chow, Econometrica 28, 1960); an imitation does not.
+/// of the right form wants the same parameters in both (Chow, Econometrica 28, 1960); an imitation does not. Asked
+/// where the housing is believed no closer than the model can be right, or a standing rotor's uneven phases count as
+/// parts.
 double gained_by_parts(const Problem& problem, const Fit& all) {
   constexpr double cuts[] = {1.0 / 3, 0.5, 2.0 / 3};
   double misfit[2 * std::size(cuts)];
+  const double whole = fit(problem, all.chosen, {&all}).misfit;
   in_parallel(std::size(misfit), [&](std::size_t i) {
     const double cut = cuts[i / 2];
     misfit[i] = fit(i % 2 == 0 ? first_part(problem, cut) : last_part(problem, cut), all.chosen, {&all}).misfit;
   });
   double most = 0;
-  for (std::size_t i = 0; i < std::size(misfit); i += 2)
-    most = std::max(most, 2 * (all.misfit - misfit[i] - misfit[i + 1]));
+  for (std::size_t i = 0; i < std::size(misfit); i += 2) most = std::max(most, 2 * (whole - misfit[i] - misfit[i + 1]));
   return most;
 }
 
@@ -526,7 +528,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   out.after_K = left.noise.disturbance_K;
   out.gain = left.gain;
   out.explains = left.evidence - without_causes.evidence;
-  out.by_parts = gained_by_parts(judged, found.chosen.fit);
+  out.by_parts = gained_by_parts(believed_less(judged, 1), found.chosen.fit);
   out.steady = out.by_parts < margins.parts;
   out.complete = left.gain < margins.remains && out.steady;
   const bool rules_parts = out.steady || out.explains > margins.dominance * out.by_parts;

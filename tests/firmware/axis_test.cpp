@@ -17,6 +17,7 @@ namespace firmware {
 
 /// Damages what no sample can reach, as a flipped bit would.
 struct AxisProbe {
+  static const thermal::HeatInput<>& heat(const Axis& axis) { return axis.input_; }
   static constexpr int targets = 6;
   static void damage(Axis& axis, int target, float value) {
     switch (target) {
@@ -500,6 +501,15 @@ TEST_F(Running, TheSlowLaneGetsTheSquareOfTheCurrent) {
   hold({0.0f, 5.0f}, 1000);
   // 25 A2, and the ripple of 48 V on 32.5 uH at 20 kHz, which at standstill is small.
   EXPECT_NEAR(axis().current2_A2(), 25.0, 0.6);
+}
+
+TEST_F(Running, RippleHeatsAndRubsNothing) {
+  motor.rad_per_s = 400;
+  hold({0.0f, 5.0f}, 2000);
+  const thermal::HeatInput<>& heat = firmware::AxisProbe::heat(axis());
+  EXPECT_NEAR(heat[thermal::Drive::current_A], 5.0, 0.1);
+  EXPECT_NEAR(heat[thermal::Drive::current_speed], 5.0 * 400, 0.1 * 400);
+  EXPECT_GT(heat[thermal::Drive::current_A2], 25.0 + 1.0);
 }
 
 TEST_F(Running, LostTimeIsChargedHotterThanTheLastSample) {

@@ -165,6 +165,36 @@ TEST(Bench, HiddenEffectsReachTheRawValues) {
   EXPECT_GT(bench.truth(1).housing_degC, 27);  // 5 W/K from a neighbour at 90 degC for 0.2 s
 }
 
+/// Joules that a hidden effect and the copper took in 0.2 s of `duty_V` at 1500 rad/s.
+struct Hidden {
+  double effect_J, copper_J;
+};
+Hidden turning_heat(const BenchDesign& design, double duty_V) {
+  Bench bench(design, 1);
+  bench.load(0).mode = Load::Mode::imposed_speed;
+  bench.load(0).speed_rad_per_s = 1500;
+  bench.motor(0).place(0, 1500);
+  for (int n = 0; n < 4000; ++n)
+    bench.advance_period({plant_tests::vector_duty(bench.motor(0), 0, duty_V, bench.bus_V()), released});
+  return {bench.stove(0).hidden_J(), bench.energy().copper_J};
+}
+
+TEST(Bench, HiddenHeatGoesBySquaresWithTheRippleAndByMagnitudesWithoutIt) {
+  BenchDesign design = plant_tests::bench_design(plant_tests::small_motor());
+  for (auto& axis : design.axes) axis.heat.copper_coefficient_per_K = 0;
+  const double emf_V = 1500 * design.axes[0].motor.pole_pairs * design.axes[0].motor.flux_linkage_Wb;
+  const double winding_ohm = 1.5 * design.axes[0].heat.phase_resistance_ohm;
+  design.axes[0].hidden.board_heat_ohm = 1;
+  const Hidden square = turning_heat(design, emf_V + 0.5);
+  EXPECT_NEAR(square.effect_J, square.copper_J / winding_ohm, 0.02 * square.effect_J);
+  design.axes[0].hidden = {};
+  design.axes[0].hidden.load_friction_W_s_per_A = 1e-3;
+  const Hidden friction = turning_heat(design, emf_V + 0.5);
+  const double all_A = std::sqrt(friction.copper_J / winding_ohm / 0.2);  // ripple included
+  EXPECT_LT(friction.effect_J, 0.8 * 1e-3 * 1500 * all_A * 0.2);
+  EXPECT_GT(friction.effect_J, 0.2 * 1e-3 * 1500 * all_A * 0.2);
+}
+
 TEST(Bench, PowerStageMeetsItsRatedRiseAndPole) {
   const host_sim::BridgeDesign bridge;
   const auto stage = host_sim::power_stage_from_rating(bridge, 48);

@@ -322,6 +322,34 @@ TEST(Bins, MergedTheyKeepTimeMeansAndReadings) {
   EXPECT_DOUBLE_EQ(identify::merged(log, 3).bins.back().signed_A, (log.bins[57].signed_A + log.bins[58].signed_A) / 2);
 }
 
+TEST(Bins, SquaresTakeTheCurrentWithItsRippleAndMagnitudesTheTorqueCurrent) {
+  identify::Log log;
+  for (int i = 0; i < 60; ++i) {
+    log.of(identify::Role::time).push_back(i);
+    log.of(identify::Role::current).push_back(-std::sqrt(3.0) / 2 * 5);  // amplitude 5: 3 of torque, 4 of ripple
+    log.of(identify::Role::iq).push_back(i % 2 == 0 ? -3 : -2);
+    log.of(identify::Role::speed).push_back(10);
+    log.of(identify::Role::housing).push_back(25);
+  }
+  const identify::Bins bins = identify::bins_of(log, 2);
+  const auto& mean = bins.bins.front().input;
+  EXPECT_DOUBLE_EQ(bins.width_s, 2);
+  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_A2], 25);
+  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current2_speed2], 2500);
+  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_A], 2.5);
+  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_speed], 25);
+  EXPECT_DOUBLE_EQ(bins.bins.front().signed_A, -2.5);
+
+  log.of(identify::Role::id).assign(60, 4);  // field weakening
+  EXPECT_DOUBLE_EQ(identify::bins_of(log, 2).bins.front().input[thermal::Drive::current_A], (5 + std::hypot(2, 4)) / 2);
+
+  for (double& i : log.of(identify::Role::iq)) i *= 10;  // some other unit
+  const identify::Bins refused = identify::bins_of(log, 2);
+  EXPECT_DOUBLE_EQ(refused.bins.front().input[thermal::Drive::current_A], 5);
+  ASSERT_EQ(refused.notes.size(), 2u);
+  EXPECT_NE(refused.notes.front().find("check both units"), std::string::npos) << refused.notes.front();
+}
+
 /// Currents that step anywhere, a winding read all the time or (`every` rows) now and then.
 identify::Bins stepping(double width_s, std::size_t every) {
   identify::Log log;

@@ -103,7 +103,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
   const double first_s = to_s(pcb.chip.now());
   const int log_ms = std::max(1, static_cast<int>(std::lround(1000 / scene.log_Hz)));
   const int total_ms = static_cast<int>(std::lround(scene.seconds * 1000));
-  double squares[2] = {}, speeds[2] = {}, torques[2] = {}, shafts[2] = {};
+  double squares[2] = {}, currents[2] = {}, speeds[2] = {}, torques[2] = {}, shafts[2] = {};
   int summed = 0;
   std::vector<double> landings = scene.shaft.landings_s;
   for (int ms = 0; ms < total_ms; ++ms) {
@@ -127,6 +127,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
         const host_sim::AxisTruth truth = pcb.bench.truth(t.axis);
         const double i_A2 = truth.current_d_A * truth.current_d_A + truth.current_q_A * truth.current_q_A;
         squares[t.axis] += i_A2;
+        currents[t.axis] += truth.current_q_A;
         speeds[t.axis] += truth.speed_rad_per_s;
         torques[t.axis] += truth.torque_Nm;
         shafts[t.axis] += truth.shaft_W;
@@ -144,8 +145,9 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
       row.time_s = time_s + 1e-3;
       row.demand_A = host::demand_A(scene, t.axis, time_s);
       row.allowance_A = static_cast<double>(state.allowance_A);
-      row.id_A = truth.current_d_A;
-      row.iq_A = truth.current_q_A;
+      row.id_now_A = truth.current_d_A;
+      row.iq_now_A = truth.current_q_A;
+      row.iq_A = currents[t.axis] / summed;
       row.current_A = root_3_over_2 * std::sqrt(squares[t.axis] / summed);
       row.speed_rad_per_s = speeds[t.axis] / summed;
       row.torque_Nm = torques[t.axis] / summed;
@@ -163,7 +165,7 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
       row.limit = state.limit;
       row.fault = state.fault.fault;
       t.rows.push_back(row);
-      squares[t.axis] = speeds[t.axis] = torques[t.axis] = shafts[t.axis] = 0;
+      squares[t.axis] = currents[t.axis] = speeds[t.axis] = torques[t.axis] = shafts[t.axis] = 0;
     }
     summed = 0;
     if (progress) progress(static_cast<double>(ms + 1) / total_ms);
