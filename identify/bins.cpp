@@ -136,12 +136,11 @@ void add_readings(Bins& out, const Log& log, Role role, double Bin::*value, floa
   }
 }
 
-/// Bin::core_ahead, the mean over the bin's readings. Inputs hold from one sample to the next, and none was read before
-/// the log began.
+/// Bin::housing_ahead and core_ahead, means over the bin's readings. Inputs hold from one sample to the next, and none
+/// was read before the log began.
 void add_ahead(Bins& out, const Log& log, const Inputs& in) {
-  if (!log.has(Role::core)) return;
   const auto& t = log.of(Role::time);
-  const auto& read = log.of(Role::core);
+  const auto &housing = log.of(Role::housing), &core = log.of(Role::core);
   const auto heat = [&](std::size_t i) {
     return out.has_power ? in.power_W[i] : in.amplitude_A[i] * in.amplitude_A[i];
   };
@@ -154,8 +153,9 @@ void add_ahead(Bins& out, const Log& log, const Inputs& in) {
     if (b != now) integral = i > 0 ? heat(i - 1) * into_s : 0;
     now = b;
     Bin& bin = out.bins[b];
-    if (!std::isnan(read[i]))
-      bin.core_ahead += (integral - bin.input[heater(out)] * into_s) / static_cast<double>(bin.core_n);
+    const double ahead = integral - bin.input[heater(out)] * into_s;
+    if (!housing.empty() && !std::isnan(housing[i])) bin.housing_ahead += ahead / static_cast<double>(bin.housing_n);
+    if (!core.empty() && !std::isnan(core[i])) bin.core_ahead += ahead / static_cast<double>(bin.core_n);
     if (i + 1 < t.size()) integral += heat(i) * (t[i + 1] - t[i]);
   }
 }
@@ -295,10 +295,12 @@ Bins merged(const Bins& log, std::size_t together) {
     for (std::size_t k = 0; k < count; ++k) {
       const Bin& bin = log.bins[first + k];
       const double more = bin.input[heater(log)] - all.input[heater(log)];
-      if (bin.core_n > 0) {
-        const double at_reading = ahead + more * log.width_s * static_cast<double>(bin.core_at) + bin.core_ahead;
-        all.core_ahead += at_reading * static_cast<double>(bin.core_n) / static_cast<double>(all.core_n);
-      }
+      const auto at_reading = [&](float where, double own, float n, float of) {
+        return n > 0 ? (ahead + more * log.width_s * static_cast<double>(where) + own) * static_cast<double>(n / of)
+                     : 0;
+      };
+      all.housing_ahead += at_reading(bin.housing_at, bin.housing_ahead, bin.housing_n, all.housing_n);
+      all.core_ahead += at_reading(bin.core_at, bin.core_ahead, bin.core_n, all.core_n);
       ahead += more * log.width_s;
     }
     if (all.housing_n == 0) all.housing_degC = missing;

@@ -32,8 +32,9 @@ struct Bin {
   float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
   float housing_n, core_n;           // readings in it
   /// How far the integral of what heats the winding (i^2 in A2 s; W s where power was recorded) had run ahead of the
-  /// bin's mean when the winding was read: a step of load inside a bin is seen by its moment.
-  double core_ahead;
+  /// bin's mean when the winding, or a housing sensor that may feel it, was read: a step of load inside a bin is seen
+  /// by its moment.
+  double housing_ahead, core_ahead;
   bool idle;  // nothing heats and nothing turns
 };
 

@@ -144,7 +144,11 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
       before += model.sensor_share * (T[model.core] - T[housing]);
       change += model.sensor_share * (next[model.core] - T[model.core] - change);
     }
+    const auto ran_ahead = [&](int node, const S& K_per_ahead, double by) {
+      return K_per_ahead * (copper.coefficient_per_K * (T[node] - 25.0) + 1.0) * by;
+    };
     S seen = before + change * static_cast<double>(bin.housing_at);
+    if (model.feels_winding) seen += model.sensor_share * ran_ahead(model.core, core_K, bin.housing_ahead);
     if (lags) {
       // Behind a ramp a first-order sensor stays by slope times lag, and what it was off by before fades away; readings
       // that are spread over the bin see the mean of that.
@@ -158,7 +162,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
     seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);
     const auto read = [&](int node, const S& K_per_ahead) {
       S degC = T[node] + (next[node] - T[node]) * static_cast<double>(bin.core_at);
-      if (bin.core_n > 0) degC += K_per_ahead * (copper.coefficient_per_K * (T[node] - 25.0) + 1.0) * bin.core_ahead;
+      if (bin.core_n > 0) degC += ran_ahead(node, K_per_ahead, bin.core_ahead);
       return degC;
     };
     S core = read(model.core, core_K);

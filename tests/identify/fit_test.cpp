@@ -376,15 +376,21 @@ TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
   hot.x.resize(two.x.size() + 2);
   hot.x << two.x.head(identify::base_count), std::log(8.0), std::log(1.5),
       two.x.tail(two.x.size() - identify::base_count);
+  Fit felt = two;  // by the housing's sensor
+  felt.chosen = {{identify::cause_named("sensor_placement"), -1}};
+  felt.x.resize(two.x.size() + 1);
+  felt.x << two.x.head(identify::base_count), 0.9, two.x.tail(two.x.size() - identify::base_count);
   const auto readings = [&](const Fit& f, const identify::Bins& log) {
+    const bool of_housing = f.chosen == felt.chosen;
     Problem other = problem;
     other.logs = {log};
-    const auto at_each = identify::replayed(other, f, 0).core_degC;
+    const identify::Replayed all = identify::replayed(other, f, 0);
+    const auto& at_each = of_housing ? all.housing_degC : all.core_degC;
     // Of the readings in each two seconds, the mean.
     std::vector<double> mean(150), number(150);
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       const auto window = static_cast<std::size_t>((static_cast<double>(k) + 0.5) * log.width_s / 2);
-      const double n = static_cast<double>(log.bins[k].core_n);
+      const double n = static_cast<double>(of_housing ? log.bins[k].housing_n : log.bins[k].core_n);
       mean.at(window) += n * at_each[k];
       number.at(window) += n;
     }
@@ -392,7 +398,7 @@ TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
     return mean;
   };
   for (const std::size_t every : {1u, 7u}) {
-    for (const Fit& f : {two, hot}) {
+    for (const Fit& f : {two, hot, felt}) {
       const auto fine = readings(f, stepping(0.1, every));
       for (const identify::Bins& log : {stepping(2, every), identify::merged(stepping(0.1, every), 20)}) {
         const auto coarse = readings(f, log);
@@ -400,7 +406,8 @@ TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
         for (std::size_t w = 0; w < fine.size(); ++w) {
           if (!std::isnan(fine[w])) worst = std::max(worst, std::abs(coarse[w] - fine[w]));
         }
-        EXPECT_LT(worst, 0.4) << "K, read every " << every << " rows; 1.8 to 5 without Bin::core_ahead";
+        EXPECT_LT(worst, 0.4) << "K, read every " << every
+                              << " rows; 1.8 to 5 without Bin::core_ahead and housing_ahead";
       }
     }
   }
