@@ -18,8 +18,8 @@ using thermal::Drive;
 
 /// 36,000 take a search 8 to 17 s on one core (README), so these a minute and a half at most.
 constexpr double most_bins = 200000;
-/// A current without its ripple is smaller than with it, but for what two sensors differ by.
-constexpr double most_over = 1.1;
+/// Of the current with its ripple, rms: without it there is less, but for what two sensors differ by.
+constexpr double most_sampled_share = 1.1;
 
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 
@@ -82,7 +82,7 @@ Inputs inputs_of(const Log& log, Bins& out) {
     in.sampled_A = in.amplitude_A;
     if (log.has(Role::iq)) {
       std::vector<double> sampled = sampled_A(log);
-      if (square(sampled) <= most_over * most_over * square(in.amplitude_A))
+      if (square(sampled) <= most_sampled_share * most_sampled_share * square(in.amplitude_A))
         in.sampled_A = std::move(sampled);
       else
         out.notes.push_back(

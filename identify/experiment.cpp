@@ -82,7 +82,7 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
     for (double t = 0; t < step.seconds; t += out.width_s) {
       Bin bin{};
       const double amps = step.current_A * unit_A;
-      add_moment(bin, 1, std::abs(amps), amps, step.speed_rad_per_s * unit_rad_per_s);
+      add_moment(bin, 1, amps, amps, step.speed_rad_per_s * unit_rad_per_s);
       auto& in = bin.input;
       for (double& b : in.boundary_degC) b = sink;
       // A neighbour that runs on its own: warm in the middle third.

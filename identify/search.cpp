@@ -502,9 +502,7 @@ struct Left {
 };
 
 /// What two parts of the logs, each fitted for itself, gain over one fit of all, at the cut where they gain most. A set
-/// of the right form wants the same parameters in both (Chow, Econometrica 28, 1960); an imitation does not. Asked
-/// where the housing is believed no closer than the model can be right, or a standing rotor's uneven phases count as
-/// parts.
+/// of the right form wants the same parameters in both (Chow, Econometrica 28, 1960); an imitation does not.
 double gained_by_parts(const Problem& problem, const Fit& all) {
   constexpr double cuts[] = {1.0 / 3, 0.5, 2.0 / 3};
   double misfit[2 * std::size(cuts)];
@@ -528,6 +526,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   out.after_K = left.noise.disturbance_K;
   out.gain = left.gain;
   out.explains = left.evidence - without_causes.evidence;
+  // Believed closer, a standing rotor's uneven phases would count as parts.
   out.by_parts = gained_by_parts(believed_less(judged, 1), found.chosen.fit);
   out.steady = out.by_parts < margins.parts;
   out.complete = left.gain < margins.remains && out.steady;

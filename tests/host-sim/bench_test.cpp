@@ -165,17 +165,17 @@ TEST(Bench, HiddenEffectsReachTheRawValues) {
   EXPECT_GT(bench.truth(1).housing_degC, 27);  // 5 W/K from a neighbour at 90 degC for 0.2 s
 }
 
-/// Joules that a hidden effect and the copper took in 0.2 s of `duty_V` at 1500 rad/s.
+/// Joules that a hidden effect and the copper took in 0.2 s at 1500 rad/s.
 struct Hidden {
   double effect_J, copper_J;
 };
-Hidden turning_heat(const BenchDesign& design, double duty_V) {
+Hidden turning_heat(const BenchDesign& design, double q_V) {
   Bench bench(design, 1);
   bench.load(0).mode = Load::Mode::imposed_speed;
   bench.load(0).speed_rad_per_s = 1500;
   bench.motor(0).place(0, 1500);
   for (int n = 0; n < 4000; ++n)
-    bench.advance_period({plant_tests::vector_duty(bench.motor(0), 0, duty_V, bench.bus_V()), released});
+    bench.advance_period({plant_tests::vector_duty(bench.motor(0), 0, q_V, bench.bus_V()), released});
   return {bench.stove(0).hidden_J(), bench.energy().copper_J};
 }
 

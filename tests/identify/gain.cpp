@@ -64,13 +64,16 @@ Case played(RecordOptions options, std::uint64_t seed, const std::string& folder
     const Trace trace = push(motor, Limiter::governor, model);
     return Push{std::max(0.0, trace.hottest_true_degC - limit_degC), trace.impulse_As / best_As};
   };
-  Case c{
-      seed,          nlohmann::json::parse(motor.truth_json)["causes"][0]["id"], report.verdict, false, outcome(before),
-      outcome(after)};
-  const auto& named = report.causes;
-  c.misnamed = c.answer.ends_with("explained") &&
-               std::none_of(named.begin(), named.end(), [&](const auto& cause) { return cause.id == c.truth; });
-  for (const auto& cause : named) c.answer += " " + cause.id;
+  Case c{.seed = seed,
+         .truth = nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
+         .answer = report.verdict,
+         .misnamed = report.verdict.ends_with("explained"),
+         .before = outcome(before),
+         .after = outcome(after)};
+  for (const auto& cause : report.causes) {
+    c.answer += " " + cause.id;
+    c.misnamed = c.misnamed && cause.id != c.truth;
+  }
   return c;
 }
 
