@@ -83,6 +83,8 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
       throw UserError(Exit::unusable, fmt::format("{}: column '{}' stands there twice; rename or delete one of them.",
                                                   table.file, source.column));
     }
+    const std::string& complaint = table.complaints[static_cast<std::size_t>(table.find(source.column))];
+    if (!complaint.empty()) throw UserError(Exit::unusable, complaint);
   }
   return found;
 }

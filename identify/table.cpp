@@ -112,9 +112,10 @@ Table read_table(const std::string& path) {
   const std::string text = whole_file(path);
   Table table;
   table.file = path;
-  const auto refuse = [&](int line, const std::string& what) {
-    throw UserError(Exit::unusable, fmt::format("{}, line {}: {}", path, line, what));
+  const auto at_line = [&](int line, const std::string& what) {
+    return fmt::format("{}, line {}: {}", path, line, what);
   };
+  const auto refuse = [&](int line, const std::string& what) { throw UserError(Exit::unusable, at_line(line, what)); };
 
   std::string_view rest = text;
   if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
@@ -147,6 +148,7 @@ Table read_table(const std::string& path) {
                "time_s,current_A,housing_degC) first.");
       }
       table.columns.resize(table.names.size());
+      table.complaints.resize(table.names.size());
       continue;
     }
     // A separator at the end of every row is some loggers' habit; one cell too many and empty is not a mistake.
@@ -162,8 +164,12 @@ Table read_table(const std::string& path) {
     for (std::size_t c = 0; c < cells.size(); ++c) {
       double value = missing;
       if (!number(cells[c], separator == ';', value)) {
-        refuse(line, fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
-                                 shown(cells[c]), shown(table.names[c])));
+        value = missing;
+        std::string& complaint = table.complaints[c];
+        if (complaint.empty())
+          complaint =
+              at_line(line, fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
+                                        shown(cells[c]), shown(table.names[c])));
       }
       table.columns[c].push_back(value);
     }

@@ -3,7 +3,8 @@
 //
 //   in   a file: comma, semicolon or tab; quotes; CRLF; byte-order mark; '#' lines before the header; decimal comma
 //        when the separator is a semicolon
-//   out  names and columns of numbers, NaN where a cell is empty or says nan
+//   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
+//        mistake only for who uses it
 //
 // Does not know what the columns mean (log.hpp does).
 #pragma once
@@ -20,6 +21,7 @@ struct Table {
   std::string file;
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;  // columns[c][row]
+  std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
   std::vector<int> line;                     // line number of each row, for sentences
 
   std::size_t rows() const { return line.size(); }

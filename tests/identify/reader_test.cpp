@@ -115,6 +115,11 @@ TEST(Reader, ARowOfTheWrongLengthIsRefusedWithItsLine) {
 TEST(Reader, TextInANumberColumnIsRefusedWithLineAndColumn) {
   says(complaint(head + "0,1,20\n1,oops,20\n"), "line 3: 'oops' in column 'current_A' is not a number");
 }
+TEST(Reader, WordsInAColumnThatNothingUsesDoNoHarm) {
+  const auto logs = read(
+      "stamp,time_s,current_A,housing_degC,state\n2026-11-22 12:00:00,0,1,20,rest\n2026-11-22 12:00:01,1,2,21,push\n");
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[1], 2);
+}
 TEST(Reader, AnEmptyFileIsRefused) { says(complaint(""), "the file is empty"); }
 TEST(Reader, AHeaderAloneIsRefused) { says(complaint(head), "no row"); }
 TEST(Reader, NumbersInsteadOfAHeaderAreRefused) { says(complaint("0,1,20\n1,1,20\n"), "where the header should be"); }
