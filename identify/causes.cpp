@@ -145,7 +145,7 @@ const std::vector<Cause>& causes() {
            {{"drift", "K/s", Scale::one, -0.05, 0.05, 0.015}}, "a slow straight drift",
            "third_mass, cooling_change, constant_heat", "an ambient sensor beside the motor; rest at the end"),
       edit("stall_imbalance", "the standing rotor heats one phase more than the mean", Edit::stall_share, Needs::speed,
-           {{"share", "", Scale::one, 0, 1.5, 0.5}}, "a stall is hotter than the mean current says", "hot_spot",
+           {{"share", "", Scale::one, 0, 2.5, 0.5}}, "a stall is hotter than the mean current says", "hot_spot",
            "stall at two angles a quarter of an electrical turn apart"),
   };
   return table;

@@ -82,8 +82,7 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
   const Scene scene = read_scene(name, scene_folder, overrides);
   RunOptions options{.motor_folder = motor_folder};
   if (hide) {
-    const HiddenMotor motor =
-        hidden_motor({.motor = scene.motor, .hide = hide, .motor_folder = motor_folder, .scene_folder = scene_folder});
+    const HiddenMotor motor = hidden_motor(*hide, scene.motor, motor_folder);
     options.plant_motor = motor.motor;
     options.hidden = motor.hidden;
   }

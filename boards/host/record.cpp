@@ -20,7 +20,8 @@ constexpr double program_Hz = 20, log_Hz = 10;
 constexpr double start_degC = 25;
 // How far a real motor may be off its sheet (a shipped actuator product scales sheet R1 by 1.6 to 1.8).
 constexpr double least_factor = 0.6, largest_factor = 1.8;
-constexpr double least_error_K = 3, largest_error_K = 10;  // of an estimator that does not know the effect
+constexpr double least_error_K = 3, largest_error_K = 10;  // of an estimator that does not know the effect,
+constexpr double sized_on_minutes = 20;                    // on a robot's duty, whatever is recorded afterwards
 // Resistance as a thermometer: a reading now and then, when the motor happens to stand still.
 constexpr double ohmmeter_K = 2, ohmmeter_every_s = 30;
 constexpr double thermocouple_K = 0.2;  // white, of a fine wire with a 16-bit converter
@@ -87,44 +88,44 @@ std::vector<host_sim::Demand> advised(const std::string& path) {
   return demands;
 }
 
-std::vector<host_sim::Demand> excitation_of(const RecordOptions& options, const Scene& scene,
-                                            const wire::Motor& sheet) {
-  const double length_s = options.minutes * 60, full_speed = host_sim::full_speed_rad_per_s(sheet, scene.supply_V);
-  using host_sim::Excitation;
-  const std::pair<const char*, Excitation> kinds[] = {
-      {"duty", Excitation::robot_duty}, {"designed", Excitation::designed}, {"step", Excitation::one_step}};
-  for (const auto& [name, kind] : kinds) {
-    if (options.excitation == name)
-      return host_sim::make_excitation(kind, sheet, full_speed, length_s, program_Hz, options.seed);
-  }
-  if (options.excitation == "profile") return advised(options.profile);
-  // A scene, again and again.
-  std::vector<host_sim::Demand> demands(static_cast<std::size_t>(length_s * program_Hz));
-  for (std::size_t i = 0; i < demands.size(); ++i) {
-    const double time_s = std::fmod(static_cast<double>(i) / program_Hz, scene.seconds);
-    demands[i].current_A = demand_A(scene, 0, time_s);
-    demands[i].speed_rad_per_s = imposed_speed_rad_per_s(scene.shaft, time_s);
-  }
-  return demands;
-}
-
-std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
-  std::vector<host_sim::Demand> demands = excitation_of(options, scene, sheet);
+/// A log begins at rest.
+std::vector<host_sim::Demand> rested(std::vector<host_sim::Demand> demands) {
   for (std::size_t i = 0; i < std::min(demands.size(), static_cast<std::size_t>(rest_first_s * program_Hz)); ++i)
     demands[i].current_A = demands[i].speed_rad_per_s = 0;
   return demands;
 }
 
+std::vector<host_sim::Demand> made(host_sim::Excitation kind, const wire::Motor& sheet, double supply_V, double minutes,
+                                   std::uint64_t seed) {
+  return rested(host_sim::make_excitation(kind, sheet, host_sim::full_speed_rad_per_s(sheet, supply_V), minutes * 60,
+                                          program_Hz, seed));
+}
+
+std::vector<host_sim::Demand> demands_of(const RecordOptions& options, const Scene& scene, const wire::Motor& sheet) {
+  using host_sim::Excitation;
+  const std::pair<const char*, Excitation> kinds[] = {
+      {"duty", Excitation::robot_duty}, {"designed", Excitation::designed}, {"step", Excitation::one_step}};
+  for (const auto& [name, kind] : kinds) {
+    if (options.excitation == name) return made(kind, sheet, scene.supply_V, options.minutes, options.seed);
+  }
+  if (options.excitation == "profile") return rested(advised(options.profile));
+  // A scene, again and again.
+  std::vector<host_sim::Demand> demands(static_cast<std::size_t>(options.minutes * 60 * program_Hz));
+  for (std::size_t i = 0; i < demands.size(); ++i) {
+    const double time_s = std::fmod(static_cast<double>(i) / program_Hz, scene.seconds);
+    demands[i].current_A = demand_A(scene, 0, time_s);
+    demands[i].speed_rad_per_s = imposed_speed_rad_per_s(scene.shaft, time_s);
+  }
+  return rested(std::move(demands));
+}
+
 }  // namespace
 
-HiddenMotor hidden_motor(const RecordOptions& options) {
-  const Scene scene = scene_of(options);
-  const wire::Motor sheet = wire::pc::read_motor(scene.motor, options.motor_folder).motor;
-  // The same motor whatever is played on it afterwards: a profile does not size the effect, the duty does.
-  RecordOptions sized_on = options;
-  if (options.excitation == "profile") sized_on.excitation = "duty";
-  const std::vector<host_sim::Demand> demands = demands_of(sized_on, scene, sheet);
-  host_sim::Random random(*options.hide);
+HiddenMotor hidden_motor(std::uint64_t seed, const std::string& motor, const std::string& motor_folder) {
+  const wire::Motor sheet = wire::pc::read_motor(motor, motor_folder).motor;
+  const double supply_V = Scene{}.supply_V;
+  const auto demands = made(host_sim::Excitation::robot_duty, sheet, supply_V, sized_on_minutes, seed);
+  host_sim::Random random(seed);
   const auto factor = [&] { return std::exp(random.uniform(std::log(least_factor), std::log(largest_factor))); };
   HiddenMotor truth{sheet, {}, {}};
   truth.motor.R1_K_per_W *= factor();
@@ -140,9 +141,8 @@ HiddenMotor hidden_motor(const RecordOptions& options) {
   host_sim::ThermalDesign design;
   design.sheet = truth.motor;
   const double target_K = random.uniform(least_error_K, largest_error_K);
-  const host_sim::DrawnEffect drawn =
-      host_sim::draw_effect(cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, scene.supply_V),
-                            target_K, random.next());
+  const host_sim::DrawnEffect drawn = host_sim::draw_effect(
+      cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, supply_V), target_K, random.next());
   truth.hidden = drawn.hidden;
   const nlohmann::ordered_json json = {
       {"format", 1},
@@ -174,9 +174,10 @@ Recording record(const RecordOptions& options) {
   RunOptions run{.motor_folder = options.motor_folder, .progress = options.progress};
   std::string truth_json = "{\n  \"format\": 1,\n  \"causes\": []\n}\n";
   if (options.hide) {
-    const HiddenMotor truth = hidden_motor(options);
+    const HiddenMotor truth = hidden_motor(*options.hide, scene.motor, options.motor_folder);
     run.plant_motor = truth.motor;
     run.hidden = truth.hidden;
+    run.hidden.cooling_change_s *= scene.seconds / (sized_on_minutes * 60);  // within this log as well
     run.winding_margin_K = unknown_motor_margin_K;
     scene.trust = "sheet";
     truth_json = truth.truth_json;

@@ -19,7 +19,7 @@ struct RecordOptions {
   std::string motor = "ec-16-40w";
   double minutes = 20;
   std::uint64_t seed = 1;                  // of excitation and sensor noise
-  std::optional<std::uint64_t> hide = {};  // of the hidden effect and of how far the motor is off its sheet
+  std::optional<std::uint64_t> hide = {};  // seed of the hidden motor, below
   bool thermocouple = false;  // a winding temperature in every line; otherwise a resistance reading now and then
   std::string motor_folder, scene_folder;
   std::function<void(double)> progress = {};
@@ -31,13 +31,13 @@ struct Recording {
   double hottest_true_degC, winding_max_degC;
 };
 
-/// The motor that `options.hide` hides: off its sheet, with an effect that is sized on the excitation of these options.
+/// A motor off its sheet, with an effect drawn from `seed`: the same whatever is recorded of it or played on it.
 struct HiddenMotor {
   wire::Motor motor;
   host_sim::HiddenEffects hidden;
   std::string truth_json;
 };
-HiddenMotor hidden_motor(const RecordOptions& options);
+HiddenMotor hidden_motor(std::uint64_t seed, const std::string& motor, const std::string& motor_folder);
 
 Recording record(const RecordOptions& options);
 

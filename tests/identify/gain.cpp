@@ -57,7 +57,7 @@ Case played(RecordOptions options, std::uint64_t seed, const std::string& folder
   wire::pc::write_whole(before, report.baseline_toml);
   wire::pc::write_whole(after, report.model_toml);
 
-  const HiddenMotor motor = hidden_motor(options);
+  const HiddenMotor motor = hidden_motor(seed, options.motor, options.motor_folder);
   const double limit_degC = sheet.motor.winding_max_degC;
   const double best_As = push(motor, Limiter::oracle, "").impulse_As;
   const auto outcome = [&](const std::string& model) {
