@@ -50,7 +50,7 @@ struct Bins {
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 
-/// `finest_s`: bins no longer than this where the sampling allows it (half the winding's time constant). Throws
+/// `finest_s`: bins no longer than this where the sampling allows it (about half the winding's time constant). Throws
 /// UserError (unusable) when the rows are too few, or share their times.
 Bins bins_of(const Log& log, double finest_s);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The table of causes. Bounds and typical sizes are in units of the scale of each parameter (cause.hpp). Typical: of
 // heat what catalogue no-load losses of small brushless motors amount to, 0.3 of the mean copper heat, and a third
-// more; of sensors and clocks a third of the bound; of couplings and cooling a tenth.
+// more; of couplings and cooling a tenth of the bound; of the rest a guess.
 #include "identify/cause.hpp"
 
 namespace identify {
@@ -96,7 +96,7 @@ const std::vector<Cause>& causes() {
            {{"k", "(s/rad)^0.8", Scale::speed08, 0, 20, 2}}, "cools faster while turning", "cooling_change",
            "cool down once at rest and once turning without load", LinkLaw::speed),
       edit("natural_convection", "cooling that grows with the temperature difference (natural convection)",
-           Edit::sink_law, Needs::nothing, {{"exponent", "", Scale::one, -0.05, 0.6, 0.25}}, "cools faster when hot",
+           Edit::sink_law, Needs::nothing, {{"exponent", "", Scale::one, -0.05, 0.8, 0.25}}, "cools faster when hot",
            "radiation, copper_coefficient", "rise by 60 K or more and cool down fully", LinkLaw::natural_convection),
       edit("radiation", "radiation", Edit::radiation, Needs::nothing,
            {{"conductance", "W/K at 300 K", Scale::sink_conductance, 0, 20, 2}},
@@ -121,12 +121,12 @@ const std::vector<Cause>& causes() {
             {"resistance", "K/W", Scale::sink_resistance, 0.01, 30, 1.2, true, 0.5}},
            "a slow tail", "ambient_drift, cooling_change", "a long rest after heating, then fast heating again"),
       edit("hot_spot", "a hot spot or end winding with a temperature of its own", Edit::hot_spot, Needs::nothing,
-           {{"capacity", "J/K", Scale::core_capacity, 0.02, 8, 1.0, true, 0.4},
+           {{"capacity", "J/K", Scale::core_capacity, 0.02, 20, 1.0, true, 0.4},
             {"resistance", "K/W", Scale::core_resistance, 0.02, 30, 1.2, true, 0.5}},
            "the winding rises fast in bursts and falls fast after", "sensor_lag, clock_delay, board_heat",
            "winding resistance every second after a burst"),
       edit("sensor_lag", "lag of the housing sensor", Edit::sensor_lag, Needs::nothing,
-           {{"lag", "s", Scale::one, 0, 120, 40}}, "readings delayed and smoothed", "clock_delay, hot_spot",
+           {{"lag", "s", Scale::one, 0, 300, 40}}, "readings delayed and smoothed", "clock_delay, hot_spot",
            "bursts, with winding readings between them"),
       edit("clock_delay", "the two recordings' clocks are apart (delay of the temperatures)", Edit::delay,
            Needs::nothing, {{"delay", "s", Scale::one, -60, 60, 20}}, "readings shifted in time", "sensor_lag",
@@ -135,7 +135,7 @@ const std::vector<Cause>& causes() {
            {{"offset", "K", Scale::one, -15, 15, 5}}, "a constant difference, from a soaked start as well",
            "constant_heat", "start soaked; read the winding there"),
       edit("sensor_gain", "gain of the housing sensor", Edit::sensor_gain, Needs::nothing,
-           {{"gain error", "", Scale::one, -0.4, 0.4, 0.15}}, "differences grow with temperature",
+           {{"gain error", "", Scale::one, -0.7, 0.7, 0.15}}, "differences grow with temperature",
            "sensor_offset, copper_coefficient", "winding readings over a wide range"),
       edit("sensor_placement", "the housing sensor sits between housing and winding (on the stator or its end turns)",
            Edit::sensor_share, Needs::nothing, {{"share", "", Scale::one, 0, 1, 0.3}},

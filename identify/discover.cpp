@@ -143,8 +143,7 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     return p.R2_K_per_W * p.C2_J_per_K;
   };
   const auto determines = [](const Problem& by, const Fit& f) {
-    const double inflation = std::max(1.0, std::sqrt(2 * f.misfit / std::max(1, f.readings)));
-    const auto lines = base_lines(by, f, inflation);
+    const auto lines = base_lines(by, f, std::max(1.0, f.ratio()));
     return lines[1].determined && lines[3].determined;
   };
   double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);

@@ -408,13 +408,14 @@ int Fit::cause_coordinates() const { return coordinates_of(chosen); }
 
 double Fit::surprise() const { return 2 * cost + narrowing; }
 
-Eigen::VectorXd Fit::std_errors() const {
+double Fit::ratio() const { return std::sqrt(2 * misfit / std::max(1, readings)); }
+
+Eigen::MatrixXd Fit::covariance(bool bounds_hold) const {
   Eigen::MatrixXd A = information;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
-    if (at_bound[static_cast<std::size_t>(i)]) decouple(A, i, 1e30);  // known, as far as this fit goes
+    if (bounds_hold && at_bound[static_cast<std::size_t>(i)]) decouple(A, i, 1e30);
   }
-  const Eigen::MatrixXd covariance = A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
-  return covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  return A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
 }
 
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm, int most) {

@@ -31,8 +31,11 @@ struct Fit {
   std::vector<bool> at_bound;
 
   int cause_coordinates() const;
-  Eigen::VectorXd std_errors() const;  // of coordinates, from the data and the prior, bounds held
-  double surprise() const;             // -2 ln of the model's evidence, up to what all models of the problem share
+  /// Of coordinates, from the data and the prior; those at a bound count as known where `bounds_hold`.
+  Eigen::MatrixXd covariance(bool bounds_hold = true) const;
+  Eigen::VectorXd std_errors() const { return covariance().diagonal().cwiseMax(0).cwiseSqrt(); }
+  double ratio() const;     // of what is left to the noise, root mean square
+  double surprise() const;  // -2 ln of the model's evidence, up to what all models of the problem share
 };
 
 /// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause

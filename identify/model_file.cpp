@@ -14,16 +14,42 @@ namespace {
 
 using thermal::boundary_names, thermal::drive_names, thermal::law_names;
 
+constexpr double least_share = 0.01;  // a sensor nearer to an end than this sits there: 0 the housing, 1 the winding
+
 std::string end_name(int end) {
   return end < thermal::first_boundary ? fmt::format("{}", end)
                                        : fmt::format("\"{}\"", boundary_names[end - thermal::first_boundary]);
 }
 
+/// Standard errors of the coordinates as a board should take them: what ended at a bound is not known for that, and
+/// where the fit leaves more than noise nothing is known as well as it seems.
+Eigen::VectorXd doubts(const Fit& f) {
+  return f.covariance(false).diagonal().cwiseMax(0).cwiseSqrt() * std::max(1.0, f.ratio());
+}
+
+/// First coordinate of a chosen cause that edits this; -1: none does.
+int coordinate_of(const Fit& f, Edit edit) {
+  int at = base_count;
+  for (const Chosen& c : f.chosen) {
+    if (cause_of(c).edit == edit) return at;
+    at += static_cast<int>(cause_of(c).parameters.size());
+  }
+  return -1;
+}
+
+/// Where the board is to believe that its sensor sits: where it does, less its doubt. A sensor taken to feel more of
+/// the winding than it does makes the winding look cooler, and no trust in a resistance covers that.
+double cautious_share(const Model<double>& m, const Fit& f) {
+  const int at = coordinate_of(f, Edit::sensor_share);
+  if (at < 0) return m.sensor_share;
+  return m.sensor_share - static_cast<double>(thermal::EstimatorSettings{}.margin_sigmas) * doubts(f)[at];
+}
+
 /// The board's sensor reads a node. Between winding and housing that is a thin one, which the heat passes through.
-void place_sensor(const Model<double>& m, thermal::HeatSet<double>& set) {
-  constexpr double thin = 0.02, least = 0.01;  // of the winding's capacity; a share of 0 is the housing, 1 the winding
-  if (m.sensor_share < least) return;
-  if (m.sensor_share > 1 - least) {
+void place_sensor(const Model<double>& m, double share, thermal::HeatSet<double>& set) {
+  constexpr double thin = 0.02;  // of the winding's capacity
+  if (share < least_share) return;
+  if (share > 1 - least_share) {
     set.housing.node = static_cast<std::int8_t>(m.core);
     return;
   }
@@ -31,10 +57,10 @@ void place_sensor(const Model<double>& m, thermal::HeatSet<double>& set) {
   set.nodes[sensor] = {thin * set.nodes[m.core].capacity_J_per_K, {}};
   set.nodes[m.core].capacity_J_per_K *= 1 - thin;
   auto& way = set.links[m.core_link];
-  set.links[set.link_count++] = {static_cast<std::int8_t>(sensor), way.to, way.law,
-                                 way.conductance_W_per_K / m.sensor_share, way.k};
+  set.links[set.link_count++] = {static_cast<std::int8_t>(sensor), way.to, way.law, way.conductance_W_per_K / share,
+                                 way.k};
   way.to = static_cast<std::int8_t>(sensor);
-  way.conductance_W_per_K /= 1 - m.sensor_share;
+  way.conductance_W_per_K /= 1 - share;
   set.housing.node = way.to;
 }
 
@@ -43,7 +69,7 @@ void place_sensor(const Model<double>& m, thermal::HeatSet<double>& set) {
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
   const Model<double> m = model_of(problem, f, 0);
   thermal::HeatSet<double> set = m.set;
-  place_sensor(m, set);
+  place_sensor(m, cautious_share(m, f), set);
   for (int i = 0; i < set.node_count; ++i) {
     const bool winding = i == m.core || i == m.hot_node;
     set.nodes[i].max_degC =
@@ -53,13 +79,17 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
 }
 
 thermal::Trust trust_of(const Fit& f) {
-  const Eigen::VectorXd sd = f.std_errors();
-  const double inflation = std::max(1.0, std::sqrt(2 * f.misfit / std::max(1, f.readings)));
+  const Eigen::VectorXd sd = doubts(f);
   const auto share = [&](int coordinate, float least) {
-    return std::clamp(static_cast<float>(sd[coordinate] * inflation), least, 0.5f);
+    return std::clamp(static_cast<float>(sd[coordinate]), least, 0.5f);
   };
-  return {share(2, thermal::identified_trust.power), share(0, thermal::identified_trust.inner_resistance),
-          share(1, thermal::identified_trust.cooling)};
+  const auto& least = thermal::identified_trust;
+  thermal::Trust trust{share(2, least.power), share(0, least.inner_resistance), share(1, least.cooling)};
+  if (const int at = coordinate_of(f, Edit::hot_spot); at >= 0) {  // then that is the hottest node
+    trust.power = std::max(trust.power, share(at, least.power));
+    trust.inner_resistance = std::max(trust.inner_resistance, share(at + 1, least.inner_resistance));
+  }
+  return trust;
 }
 
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {

@@ -14,8 +14,9 @@ namespace identify {
 /// The set itself, with the winding's limit.
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& fit);
 
-/// How far the board may trust the set: standard errors of the fit, widened where it leaves more than noise, and never
-/// better than what such a fit is worth (thermal::identified_trust).
+/// How far the board may trust the set: standard errors of the fit, the causes' own where they stand between a sensor
+/// and the hottest node, widened where it leaves more than noise, and never better than what such a fit is worth
+/// (thermal::identified_trust).
 thermal::Trust trust_of(const Fit& fit);
 
 /// `sentence`: what was found, written as a comment at the top.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "identify/fit.hpp"
 #include "wire/pc/user_error.hpp"
@@ -144,6 +145,26 @@ void rough_search(Problem& whole) {
   if (least < 1e300) whole.belief = best;
 }
 
+/// A sensor that feels the winding shows how its temperature bends within a bin. Where a fit with such a sensor has it
+/// move there by more than it is noisy: a quarter of the winding's time constant. Infinite where it does not.
+double bent_within_s(const Problem& problem) {
+  const Fit felt = fit(problem, {{cause_named("sensor_placement"), -1}});
+  if (felt.x.size() == 0) return std::numeric_limits<double>::infinity();
+  const Physical p = physical(felt.x);
+  const double ohm = problem.heated_by_power() ? 1 : problem.belief.ohm, share = felt.x[base_count];
+  const double white_K = problem.noise.housing_white_K;
+  double sum = 0, readings = 0;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) {
+      if (bin.housing_n == 0) continue;
+      const double bent_K = share * ohm / p.C1_J_per_K * bin.housing_ahead;
+      sum += bent_K * bent_K * static_cast<double>(bin.housing_n);
+      readings += 1;
+    }
+  }
+  return sum > readings * white_K * white_K ? p.R1_K_per_W * p.C1_J_per_K / 4 : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 bool Problem::any_core() const {
@@ -239,10 +260,14 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
            static_cast<std::ptrdiff_t>(core.size() / 2);
   });
   if (dense) finest_s = std::min(finest_s, longest_bin_s) / 2;
-  for (const Log& log : logs) problem.logs.push_back(bins_of(log, finest_s));
+  const auto take_in = [&](double bin_s) {
+    problem.logs.clear();
+    for (const Log& log : logs) problem.logs.push_back(bins_of(log, bin_s));
+    noise_from_rest(problem);
+    set_scales(problem);
+  };
+  take_in(finest_s);
   if (problem.heated_by_power()) problem.belief.copper_per_K = 0;
-  noise_from_rest(problem);
-  set_scales(problem);
   if (!(problem.heat_W > 0)) {
     throw wire::pc::UserError(
         wire::pc::Exit::unusable,
@@ -251,6 +276,7 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
             problem.logs.front().name));
   }
   if (!motor) rough_search(problem);
+  if (const double bent_s = bent_within_s(problem); bent_s < finest_s) take_in(bent_s);
   return problem;
 }
 

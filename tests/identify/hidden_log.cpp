@@ -97,7 +97,7 @@ std::vector<Row> designed_profile(Draw& d, double rms_A, double top, double seco
 
 /// Sets one effect of size a (about 1) in a motor whose mean copper heat is `heat_W`.
 void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& m, double heat_W, double rms_A,
-          double top, double when_s, bool other, double& delay_s) {
+          double top, double when_s, bool other) {
   const double k = std::abs(a), G2 = 1 / m.R2_K_per_W;
   if (id == "speed_loss_linear") (other ? x.hysteresis_W_s : x.coulomb_drag_W_s) = k * heat_W / (0.3 * top);
   if (id == "speed_loss_quadratic") (other ? x.eddy_W_s2 : x.viscous_drag_W_s2) = k * heat_W / (0.15 * top * top);
@@ -125,7 +125,7 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "sensor_gain") x.sensor_gain = std::max(-0.35, std::min(0.35, 0.1 * a));
   if (id == "sensor_placement") x.sensor_share = std::min(0.9, 0.3 * k);
   if (id == "ambient_drift") x.ambient_drift_K_per_s = 0.008 * a;
-  if (id == "clock_delay") delay_s = std::min(50.0, 10 * k);
+  if (id == "clock_delay") x.clock_delay_s = std::min(50.0, 10 * k);
   if (id == "stall_imbalance") x.stall_imbalance = std::min(1.0, k), x.stall_below_rad_per_s = 1;
   if (id == "latent")
     x.latent_J = 15 * k * m.C2_J_per_K, x.latent_degC = 45 + 10 * (other ? 1 : 0), x.latent_width_K = 2;
@@ -135,38 +135,6 @@ void hide(HiddenEffects& x, const std::string& id, double a, const wire::Motor& 
   if (id == "thermostat") x.thermostat_gain = 1.5 * k, x.thermostat_degC = 48;
   if (id == "curing") x.curing_gain = std::min(0.6, 0.4 * k), x.curing_s = 200;
   if (id == "overload") x.overload_W_per_A4 = k * heat_W / std::pow(1.4 * rms_A, 4);
-}
-
-/// The same effect in the terms of identify's table.
-std::vector<double> in_words_of_the_table(const std::string& id, const HiddenEffects& x, const wire::Motor& m,
-                                          double delay_s) {
-  if (id == "speed_loss_linear") return {x.hysteresis_W_s + x.coulomb_drag_W_s};
-  if (id == "speed_loss_quadratic") return {x.eddy_W_s2 + x.viscous_drag_W_s2};
-  if (id == "windage") return {x.windage_W_s3};
-  if (id == "winding_eddy") return {x.winding_eddy_W_s2};
-  if (id == "ac_copper_loss") return {1.5 * m.phase_resistance_ohm * x.ac_copper_s2};
-  if (id == "load_friction") return {x.load_friction_W_s_per_A};
-  if (id == "copper_coefficient") return {m.copper_coefficient_per_K + x.copper_coefficient_per_K};
-  if (id == "bridge_loss") return {x.bridge_loss_W_per_A};
-  if (id == "current_offset") return {x.current_offset_A};
-  if (id == "board_heat") return {x.board_heat_ohm};
-  if (id == "constant_heat") return {x.constant_heat_W};
-  if (id == "speed_cooling") return {x.speed_cooling_per_speed08};
-  if (id == "natural_convection") return {x.convection_exponent};
-  if (id == "radiation") return {x.radiation_W_per_K};
-  if (id == "cooling_change") return {1 / x.cooling_change, x.cooling_change_s};
-  if (id == "third_mass") return {x.third_mass_J_per_K, x.third_mass_K_per_W};
-  if (id == "hot_spot") return {x.hot_spot_J_per_K, x.hot_spot_K_per_W};
-  if (id == "neighbour_heat") return {x.neighbour_W_per_K};
-  if (id == "frame_conduction") return {x.frame_W_per_K};
-  if (id == "sensor_lag") return {x.sensor_lag_s};
-  if (id == "sensor_offset") return {x.sensor_offset_K};
-  if (id == "sensor_gain") return {x.sensor_gain};
-  if (id == "sensor_placement") return {x.sensor_share};
-  if (id == "ambient_drift") return {x.ambient_drift_K_per_s};
-  if (id == "clock_delay") return {delay_s};
-  if (id == "stall_imbalance") return {x.stall_imbalance};
-  return {};
 }
 
 /// Warm things beside the motor that live their own lives: random levels, reached slowly.
@@ -193,14 +161,14 @@ struct Track {
   std::vector<double> core, housing, sensed, neighbour;
 };
 
-Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const HiddenEffects& hidden, double delay_s,
+Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const HiddenEffects& hidden,
           const std::vector<Row>& rows, double ambient_degC, double start_degC, const std::vector<double>& neighbour,
           const std::vector<double>& frame, std::uint64_t seed) {
   host_sim::Stove stove(host_sim::heat_from_sheet(truth, options), hidden, seed);
   stove.soak(start_degC);
   stove.around.ambient_degC = ambient_degC;
   Track out;
-  const auto late = static_cast<long>(std::lround(delay_s / row_s));
+  const auto late = static_cast<long>(std::lround(hidden.clock_delay_s / row_s));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     out.core.push_back(stove.copper_degC());
     out.housing.push_back(stove.degC(host_sim::Place::housing));
@@ -254,6 +222,37 @@ std::vector<std::string> hideable() {
           "clock_delay",
           "stall_imbalance",
           "sensor_placement"};
+}
+
+std::vector<double> in_words_of_the_table(const std::string& id, const host_sim::HiddenEffects& x,
+                                          const wire::Motor& m) {
+  if (id == "speed_loss_linear") return {x.hysteresis_W_s + x.coulomb_drag_W_s};
+  if (id == "speed_loss_quadratic") return {x.eddy_W_s2 + x.viscous_drag_W_s2};
+  if (id == "windage") return {x.windage_W_s3};
+  if (id == "winding_eddy") return {x.winding_eddy_W_s2};
+  if (id == "ac_copper_loss") return {1.5 * m.phase_resistance_ohm * x.ac_copper_s2};
+  if (id == "load_friction") return {x.load_friction_W_s_per_A};
+  if (id == "copper_coefficient") return {m.copper_coefficient_per_K + x.copper_coefficient_per_K};
+  if (id == "bridge_loss") return {x.bridge_loss_W_per_A};
+  if (id == "current_offset") return {x.current_offset_A};
+  if (id == "board_heat") return {x.board_heat_ohm};
+  if (id == "constant_heat") return {x.constant_heat_W};
+  if (id == "speed_cooling") return {x.speed_cooling_per_speed08};
+  if (id == "natural_convection") return {x.convection_exponent};
+  if (id == "radiation") return {x.radiation_W_per_K};
+  if (id == "cooling_change") return {1 / x.cooling_change, x.cooling_change_s};
+  if (id == "third_mass") return {x.third_mass_J_per_K, x.third_mass_K_per_W};
+  if (id == "hot_spot") return {x.hot_spot_J_per_K, x.hot_spot_K_per_W};
+  if (id == "neighbour_heat") return {x.neighbour_W_per_K};
+  if (id == "frame_conduction") return {x.frame_W_per_K};
+  if (id == "sensor_lag") return {x.sensor_lag_s};
+  if (id == "sensor_offset") return {x.sensor_offset_K};
+  if (id == "sensor_gain") return {x.sensor_gain};
+  if (id == "sensor_placement") return {x.sensor_share};
+  if (id == "ambient_drift") return {x.ambient_drift_K_per_s};
+  if (id == "clock_delay") return {x.clock_delay_s};
+  if (id == "stall_imbalance") return {x.stall_imbalance};
+  return {};
 }
 
 std::vector<std::string> outside() {
@@ -310,8 +309,7 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
 
   // Size: the winding (or, for what only the sensor sees, the reading) is to be off by 1..10 K rms before any refit.
   HiddenEffects hidden;
-  double delay_s = 0;
-  const Track clean = run(m, options, hidden, 0, rows, ambient, start, neighbour, frame, o.seed);
+  const Track clean = run(m, options, hidden, rows, ambient, start, neighbour, frame, o.seed);
   for (std::size_t e = 0; o.strength > 0 && e < o.effects.size(); ++e) {
     const bool other = d.uniform(0, 1) < 0.5;
     const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds;
@@ -320,15 +318,14 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
     double a = 0.2 * sign, error = 0;
     for (int i = 0; i < 4; ++i) {
       HiddenEffects one;
-      double late = 0;
-      hide(one, o.effects[e], a, m, mean_heat, rms_A, top, when, other, late);
-      const Track t = run(m, options, one, late, rows, ambient, start, neighbour, frame, o.seed);
+      hide(one, o.effects[e], a, m, mean_heat, rms_A, top, when, other);
+      const Track t = run(m, options, one, rows, ambient, start, neighbour, frame, o.seed);
       error = std::max(rms(t.core, clean.core), rms(t.sensed, clean.sensed));
       if (!(error > 1e-6) || std::abs(error / wanted - 1) < 0.1) break;
       a = std::max(-6.0, std::min(6.0, a * std::max(0.1, std::min(10.0, wanted / error))));
     }
     if (error < 0.9 * least_error_K * o.strength) return std::nullopt;
-    hide(hidden, o.effects[e], a, m, mean_heat, rms_A, top, when, other, delay_s);
+    hide(hidden, o.effects[e], a, m, mean_heat, rms_A, top, when, other);
     out.core_error_K = std::max(out.core_error_K, error);
   }
   if (o.small_ones) {
@@ -336,12 +333,12 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
          {"speed_loss_linear", "ac_copper_loss", "bridge_loss", "board_heat", "constant_heat", "speed_cooling",
           "natural_convection", "radiation", "neighbour_heat", "sensor_lag", "stall_imbalance"}) {
       HiddenEffects before = hidden;
-      hide(hidden, id, 0.012 * (1 + d.uniform(0, 1)), m, mean_heat, rms_A, top, 0, false, delay_s);
+      hide(hidden, id, 0.012 * (1 + d.uniform(0, 1)), m, mean_heat, rms_A, top, 0, false);
       if (std::find(o.effects.begin(), o.effects.end(), id) != o.effects.end()) hidden = before;
     }
   }
   for (const std::string& id : o.effects) {
-    if (auto values = in_words_of_the_table(id, hidden, m, delay_s); !values.empty()) out.parameters[id] = values;
+    if (auto values = in_words_of_the_table(id, hidden, m); !values.empty()) out.parameters[id] = values;
   }
   if (o.again != 0 || !o.profile.empty()) {
     d = Draw{std::mt19937_64((o.seed ^ (o.again << 32)) * 15485863 + 11)};
@@ -349,7 +346,7 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
     neighbour = wandering(d, rows.size(), ambient, 180);
     frame = wandering(d, rows.size(), ambient, 250);
   }
-  const Track t = run(m, options, hidden, delay_s, rows, ambient, start, neighbour, frame, o.seed + o.again);
+  const Track t = run(m, options, hidden, rows, ambient, start, neighbour, frame, o.seed + o.again);
   out.core_degC = t.core;
 
   std::ofstream csv(path);

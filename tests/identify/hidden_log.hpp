@@ -53,6 +53,10 @@ struct HiddenLog {
 std::vector<std::string> hideable();
 std::vector<std::string> outside();
 
+/// An effect of the plant in the parameters of identify's table; none for effects outside of it.
+std::vector<double> in_words_of_the_table(const std::string& id, const host_sim::HiddenEffects& effects,
+                                          const wire::Motor& motor);
+
 HiddenLog make_hidden_log(const HiddenLogOptions& options, const std::string& path);
 
 }  // namespace tests

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "host-sim/plant/hidden_causes.hpp"
 #include "identify/baseline.hpp"
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
@@ -296,6 +297,29 @@ TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
         "power_share",        "sensor_placement"}) {
     EXPECT_GE(identify::cause_named(id), 0) << id;
   }
+}
+
+TEST(Causes, BoundsHoldWhateverHostSimHides) {
+  const wire::Motor sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors").motor;
+  int compared = 0;
+  for (const host_sim::HiddenCause& hidden : host_sim::hidden_causes()) {
+    if (!hidden.in_catalogue) continue;
+    const identify::Cause& cause = identify::causes().at(static_cast<std::size_t>(identify::cause_named(hidden.id)));
+    for (const double amount : {hidden.largest, hidden.either_sign ? -hidden.largest : 0.0}) {
+      host_sim::HiddenEffects effects;
+      host_sim::Random random(1);
+      hidden.apply(effects, {sheet, 1, 1, 1, 1200}, amount, random);
+      const std::vector<double> values = tests::in_words_of_the_table(hidden.id, effects, sheet);
+      for (std::size_t p = 0; p < cause.parameters.size(); ++p) {
+        const identify::Parameter& parameter = cause.parameters[p];
+        if (parameter.scale != identify::Scale::one) continue;
+        EXPECT_GE(values.at(p), parameter.low) << hidden.id;
+        EXPECT_LE(values.at(p), parameter.high) << hidden.id;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 15);
 }
 
 TEST(Causes, WhatOneIsEasilyTakenForStandsInTheTable) {
