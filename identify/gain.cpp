@@ -145,12 +145,12 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
   if (!thermal::validate(before_set, estimator_dt_s).ok() || !thermal::validate(truth, estimator_dt_s).ok())
     return std::nullopt;
   const thermal::HeatInput<> work = working_point(problem);
-  const thermal::Trust trust = trust_of(extended);
+  const thermal::Trust trust = trust_of(problem, extended);
   const double most_A = asked_over_rms * problem.rms_A;
   const double continuous_A = answers_of(truth, trust, truth, work, most_A, 0).continuous_A;
   if (!(continuous_A > 0)) return std::nullopt;
   const double burst_A = burst_over_continuous * continuous_A;
-  const Answers before = answers_of(before_set, trust_of(baseline), truth, work, most_A, burst_A),
+  const Answers before = answers_of(before_set, trust_of(problem, baseline), truth, work, most_A, burst_A),
                 after = answers_of(truth, trust, truth, work, most_A, burst_A);
   using thermal::direct_A;
   return Gain{.overshoot_before_K = before.overshoot_K,
@@ -172,7 +172,7 @@ const Fit& most_cautious(const Problem& problem, const std::vector<const Fit*>& 
   double burst_A = 0;
   std::vector<std::optional<thermal::HeatSet<double>>> sets;
   const auto answers = [&](std::size_t i, double at_A) {
-    return answers_of(*sets[i], trust_of(*fits[i]), *sets[i], work, most_A, at_A);
+    return answers_of(*sets[i], trust_of(problem, *fits[i]), *sets[i], work, most_A, at_A);
   };
   for (std::size_t i = 0; i < fits.size(); ++i) {
     sets.emplace_back(heat_set_of(problem, *fits[i]));

@@ -21,10 +21,11 @@ std::string end_name(int end) {
                                        : fmt::format("\"{}\"", boundary_names[end - thermal::first_boundary]);
 }
 
-/// Standard errors of the coordinates as a board should take them: what ended at a bound is not known for that, and
-/// where the fit leaves more than noise nothing is known as well as it seems.
-Eigen::VectorXd doubts(const Fit& f) {
-  return f.covariance(false).diagonal().cwiseMax(0).cwiseSqrt() * std::max(1.0, f.ratio());
+/// Covariance of the coordinates as a board should take it: what ended at a bound is not known for that, and where the
+/// fit leaves more than noise nothing is known as well as it seems.
+Eigen::MatrixXd doubts(const Fit& f) {
+  const double widened = std::max(1.0, f.ratio());
+  return f.covariance(false) * (widened * widened);
 }
 
 /// First coordinate of a chosen cause that edits this; -1: none does.
@@ -42,7 +43,8 @@ int coordinate_of(const Fit& f, Edit edit) {
 double cautious_share(const Model<double>& m, const Fit& f) {
   const int at = coordinate_of(f, Edit::sensor_share);
   if (at < 0) return m.sensor_share;
-  return m.sensor_share - static_cast<double>(thermal::EstimatorSettings{}.margin_sigmas) * doubts(f)[at];
+  return m.sensor_share -
+         static_cast<double>(thermal::EstimatorSettings{}.margin_sigmas) * std::sqrt(std::max(0.0, doubts(f)(at, at)));
 }
 
 /// The board's sensor reads a node. Between winding and housing that is a thin one, which the heat passes through.
@@ -78,18 +80,29 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
   return set;
 }
 
-thermal::Trust trust_of(const Fit& f) {
-  const Eigen::VectorXd sd = doubts(f);
-  const auto share = [&](int coordinate, float least) {
-    return std::clamp(static_cast<float>(sd[coordinate]), least, 0.5f);
-  };
+thermal::Trust trust_of(const Problem& problem, const Fit& f) {
   const auto& least = thermal::identified_trust;
-  thermal::Trust trust{share(2, least.power), share(0, least.inner_resistance), share(1, least.cooling)};
-  if (const int at = coordinate_of(f, Edit::hot_spot); at >= 0) {  // then that is the hottest node
-    trust.power = std::max(trust.power, share(at, least.power));
-    trust.inner_resistance = std::max(trust.inner_resistance, share(at + 1, least.inner_resistance));
+  const Eigen::MatrixXd doubt = doubts(f);
+  const auto unit = [&](int coordinate) -> Eigen::VectorXd { return Eigen::VectorXd::Unit(f.x.size(), coordinate); };
+  // Slopes of logarithms: heat against capacity goes as 1/C1, what flows on against capacity as 1/(R1 C1).
+  int capacity = 2, resistance = 0;
+  if (const int at = coordinate_of(f, Edit::hot_spot); at >= 0) capacity = at, resistance = at + 1;  // the hottest node
+  Eigen::VectorXd power = -unit(capacity);
+  if (const int at = coordinate_of(f, Edit::coefficient); at >= 0) {
+    const double most_K = problem.belief.winding_max_degC - 25;
+    power += unit(at) * most_K / (1 + f.x[at] * most_K);
   }
-  return trust;
+  const auto together = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return a.dot(doubt * b); };
+  // The board takes the errors of heat and of what flows on for independent. Where they go together that overstates
+  // both, and the smaller of R1's and the time constant's is still on the safe side.
+  const Eigen::VectorXd flow = -unit(capacity) - unit(resistance);
+  double inner = together(unit(resistance), unit(resistance));
+  if (together(power, flow) >= 0) inner = std::min(inner, together(flow, flow));
+  const auto share = [](double variance, float at_least) {
+    return std::clamp(static_cast<float>(std::sqrt(std::max(0.0, variance))), at_least, 0.5f);
+  };
+  return {share(together(power, power), least.power), share(inner, least.inner_resistance),
+          share(together(unit(1), unit(1)), least.cooling)};
 }
 
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {
@@ -126,7 +139,7 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   }
   s += fmt::format("\n[housing_sensor]\nnode = {}\nlag_s = {:.6g}\noffset_K = {:.6g}\ngain_error = {:.6g}\n",
                    int{set.housing.node}, set.housing.lag_s, set.housing.offset_K, set.housing.gain_error);
-  const thermal::Trust trust = trust_of(f);
+  const thermal::Trust trust = trust_of(problem, f);
   s += fmt::format("\n[trust]\npower = {:.3f}\ninner_resistance = {:.3f}\ncooling = {:.3f}\n", trust.power,
                    trust.inner_resistance, trust.cooling);
   std::string recording;

@@ -17,7 +17,7 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& fit);
 /// How far the board may trust the set: standard errors of the fit, the causes' own where they stand between a sensor
 /// and the hottest node, widened where it leaves more than noise, and never better than what such a fit is worth
 /// (thermal::identified_trust).
-thermal::Trust trust_of(const Fit& fit);
+thermal::Trust trust_of(const Problem& problem, const Fit& fit);
 
 /// `sentence`: what was found, written as a comment at the top.
 std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence);

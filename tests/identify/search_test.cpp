@@ -148,7 +148,20 @@ TEST(Search, ASensorOnTheStatorIsFoundAndTheBoardsSetPutsItThere) {
   for (int i = 0; i < 30; ++i) degC = network.step(step, degC, input);
   const double winding = degC[0], housing = degC[1], sensed = degC[set.housing.node];
   ASSERT_GT(winding - housing, 1);
-  EXPECT_NEAR((sensed - housing) / (winding - housing), share.value, 0.01);
+  const double handed_on = (sensed - housing) / (winding - housing);
+  EXPECT_NEAR(handed_on, share.value - 2 * share.std_error, 0.02) << "less its doubt, towards hot";
+  EXPECT_LT(handed_on, share.value - share.std_error);
+}
+
+TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
+  const auto bin_s = [](const tests::HiddenLogOptions& o) { return hidden(o).problem.logs[0].width_s; };
+  tests::HiddenLogOptions fast;  // an EC 16 whose winding follows within 0.9 s
+  fast.seed = 17;
+  const double usual_s = bin_s(fast);
+  fast.effects = {"sensor_placement"};
+  EXPECT_LT(bin_s(fast), 0.5 * usual_s);
+  fast.effects = {"board_heat"};
+  EXPECT_EQ(bin_s(fast), usual_s) << "a sensor that feels the load, and not within a bin";
 }
 
 TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass) {
@@ -285,6 +298,29 @@ TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
   const auto& cause = identify::cause_of(f.chosen[0]);
   EXPECT_NEAR(file["source"][1]["gain"].value_or(0.0), identify::parameter_value(log.problem, cause, 0, f.x[4]),
               1e-4 * std::abs(f.x[4]));
+}
+
+TEST(ModelFile, TrustIsInWhatTheBoardsHeatDependsOn) {
+  identify::Problem problem;
+  const auto trust = [&](double together, bool at_bound = false, double misfit = 50) {
+    identify::Fit f;
+    f.x = Eigen::VectorXd::Zero(6);
+    f.at_bound = {false, false, at_bound, false, false, false};
+    Eigen::MatrixXd covariance = 1e-6 * Eigen::MatrixXd::Identity(6, 6);
+    covariance(0, 0) = covariance(2, 2) = 0.08 * 0.08;
+    covariance(0, 2) = covariance(2, 0) = together * 0.08 * 0.08;
+    f.information = covariance.inverse();
+    f.readings = 100;
+    f.misfit = misfit;
+    return identify::trust_of(problem, f);
+  };
+  EXPECT_NEAR(trust(0).power, 0.08f, 1e-5);
+  EXPECT_NEAR(trust(0).inner_resistance, 0.08f, 1e-5);
+  EXPECT_NEAR(trust(-0.8).inner_resistance, 0.08 * std::sqrt(0.4), 1e-5) << "their product is known better than each";
+  EXPECT_NEAR(trust(0.8).inner_resistance, 0.08f, 1e-5);
+  EXPECT_EQ(trust(-0.99).inner_resistance, thermal::identified_trust.inner_resistance) << "as good as such a fit is";
+  EXPECT_NEAR(trust(0, true).power, 0.08f, 1e-5) << "what ended at a bound is not known for that";
+  EXPECT_NEAR(trust(0, false, 200).power, 0.16f, 1e-5) << "and more than noise was left";
 }
 
 TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
