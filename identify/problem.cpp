@@ -147,7 +147,7 @@ void rough_search(Problem& whole) {
 
 /// A sensor that feels the winding shows how its temperature bends within a bin. Where a fit with such a sensor has it
 /// move there by more than it is noisy: a quarter of the winding's time constant. Infinite where it does not.
-double bent_within_s(const Problem& problem) {
+double felt_winding_bin_s(const Problem& problem) {
   const Fit felt = fit(problem, {{cause_named("sensor_placement"), -1}});
   if (felt.x.size() == 0) return std::numeric_limits<double>::infinity();
   const Physical p = physical(felt.x);
@@ -276,7 +276,7 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
             problem.logs.front().name));
   }
   if (!motor) rough_search(problem);
-  if (const double bent_s = bent_within_s(problem); bent_s < finest_s) take_in(bent_s);
+  if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
   return problem;
 }
 

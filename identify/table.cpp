@@ -84,7 +84,7 @@ bool number(std::string_view s, bool decimal_comma, double& value) {
   if (s.front() == '+') s.remove_prefix(1);
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
   if (error == std::errc::result_out_of_range) return value = missing, end == s.data() + s.size();
-  if (error != std::errc() || end != s.data() + s.size()) return false;
+  if (error != std::errc() || end != s.data() + s.size()) return value = missing, false;
   if (!std::isfinite(value)) value = missing;
   return true;
 }
@@ -164,7 +164,6 @@ Table read_table(const std::string& path) {
     for (std::size_t c = 0; c < cells.size(); ++c) {
       double value = missing;
       if (!number(cells[c], separator == ';', value)) {
-        value = missing;
         std::string& complaint = table.complaints[c];
         if (complaint.empty())
           complaint =
