@@ -27,7 +27,7 @@ inline constexpr double longest_bin_s = 2;
 struct Bin {
   thermal::HeatInput<double> input;  // means over the bin
   double signed_A;                   // mean current with its sign
-  double stalled_A2;                 // mean of i^2 while |w| is below stalled_rad_per_s, else of 0
+  double stalled_A2, stalled_A4;     // means of i^2 and i^4 while |w| is below stalled_rad_per_s, else of 0
   double housing_degC, core_degC;    // mean reading, NaN: none
   float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
   float housing_n, core_n;           // readings in it

@@ -265,6 +265,33 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
   }
 }
 
+/// What a board is given. Where the data cannot choose, it must not take the milder model for true: of sets that tie,
+/// and of two resistors and what is as likely by the log and only too little to be named, it gets the one that bears a
+/// push the shortest. Where nothing explains the log, no fit is worth more than a sheet.
+Offer for_the_board(const Problem& problem, const Search& found, Report& report) {
+  const Fit& best = found.chosen.fit;
+  const bool unexplained = found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient;
+  const thermal::Trust trust = trust_of(problem, best, unexplained ? thermal::sheet_trust : thermal::identified_trust);
+  std::vector<Offer> open = {{&best, trust}};
+  if (found.verdict == Verdict::ambiguous) {
+    for (const Candidate& c : found.sets) {
+      if (c.tied) open.push_back({&c.fit, trust_of(problem, c.fit)});
+    }
+  }
+  if (found.verdict == Verdict::adequate) {
+    for (const Candidate& c : found.singles) {
+      if (c.tied) open.push_back({&c.fit, trust});
+    }
+  }
+  if (open.size() == 1) return open.front();
+  const Offer& given = most_cautious(problem, open);
+  report.reasoning.push_back(
+      fmt::format("The model written for the board is, of those that the log bears out as well, the one that bears a "
+                  "push the shortest: {}.",
+                  given.fit->chosen.empty() ? "two resistors" : listed(ids_of(given.fit->chosen), " and ")));
+  return given;
+}
+
 }  // namespace
 
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
@@ -324,36 +351,29 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   // Both models as the last search fitted them.
   const Fit& two = poor.empty() ? found.base.fit : base;
   if (!extended) found.chosen.fit = two;
-  const Fit* written = &found.chosen.fit;
   if (!poor.empty()) {
-    report.verdict = word(Verdict::insufficient);
+    found.verdict = Verdict::insufficient;
+    report.verdict = word(found.verdict);
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
     report.reasoning.push_back(poor);
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
-    // Where the data cannot choose, a board must not take the milder model for true.
-    if (extended && found.verdict == Verdict::ambiguous) {
-      std::vector<const Fit*> open = {written};
-      for (const Candidate& c : found.sets) {
-        if (c.tied) open.push_back(&c.fit);
-      }
-      written = &most_cautious(problem, open);
-      report.reasoning.push_back(
-          fmt::format("The model written for the board is the one that bears a push the shortest: {}.",
-                      listed(ids_of(written->chosen), " and ")));
-    }
-    if (extended) {
-      add_extended(problem, found.chosen.fit, report, 0);
-      if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *written);
-    }
+  }
+  const Offer given = for_the_board(problem, found, report);
+  if (extended) {
+    add_extended(problem, found.chosen.fit, report, 0);
+    if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *given.fit);
+  }
+  if (poor.empty()) {
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);
   }
   if (held.fraction > 0 || !held.logs.empty())
     report.held_out = score_held_out(whole, motor, held, two, found.chosen.fit, report);
-  report.model_toml = heat_set_toml(problem, *written, report.sentence);
-  report.baseline_toml = heat_set_toml(problem, two, "The two-resistor model as fitted, without what was found.");
+  report.model_toml = heat_set_toml(problem, *given.fit, report.sentence, given.trust);
+  report.baseline_toml =
+      heat_set_toml(problem, two, "The two-resistor model as fitted, without what was found.", trust_of(problem, two));
   return report;
 }
 

@@ -12,6 +12,9 @@ namespace {
 /// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
 /// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
+/// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
+/// deviation.
+const double ordinary_uneven_share = 1 / std::sqrt(3.0);
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
 struct Coordinate {
@@ -136,35 +139,46 @@ struct Whitener {
         P_disturbed(disturbance2) {}
 };
 
-/// The housing's ordinary lateness s as the whitened readings show it. Averaged over, residuals have the covariance
-/// 1 + s s^T, whose inverse is 1 - s s^T / (1 + s^T s).
-struct Leeway {
-  std::vector<std::vector<double>> late;  // s, for each log and bin; empty: none
-  double share = 0;                       // 1 / (1 + s^T s)
+/// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
+/// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
+struct Averaged {
+  static constexpr std::size_t most = 2;
+  std::vector<Leeway> effects;  // whitened
+  Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
   double log_determinant = 0;
 
-  explicit Leeway(const Problem& problem) : late(problem.lateness_K) {
-    double sum = 1;
-    for (std::size_t l = 0; l < late.size(); ++l) {
+  explicit Averaged(const Problem& problem) : effects(problem.leeway) {
+    const auto n = static_cast<Eigen::Index>(effects.size());
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(n, n);
+    for (std::size_t l = 0; l < problem.logs.size() && n > 0; ++l) {
       const Bins& log = problem.logs[l];
-      Whitener w = Whitener::housing(problem.noise, log.width_s);
-      double wander = 0, disturbance = 0;
-      for (std::size_t k = 0; k < log.bins.size(); ++k) {
-        if (log.bins[k].housing_n > 0) {
-          double& s = late[l][k];
-          w.reading(static_cast<double>(log.bins[k].housing_n));
-          s = (s - wander - disturbance) * w.weight;
-          wander += w.gain / w.weight * s;
-          disturbance += w.gain_disturbed / w.weight * s;
-          sum += s * s;
-        }
-        w.step();
-        wander *= w.keep;
-        disturbance *= w.keep_disturbed;
-      }
+      whiten(Whitener::housing(problem.noise, log.width_s), log, &Bin::housing_n, &Leeway::housing_K, l, sum);
+      whiten(Whitener::core(problem.noise, log.width_s), log, &Bin::core_n, &Leeway::core_K, l, sum);
     }
-    share = 1 / sum;
-    log_determinant = std::log(sum);
+    inverse = sum.inverse();
+    log_determinant = std::log(sum.determinant());
+  }
+
+ private:
+  void whiten(Whitener w, const Bins& log, float Bin::*readings, std::vector<std::vector<double>> Leeway::*channel,
+              std::size_t l, Eigen::MatrixXd& sum) {
+    const auto n = static_cast<Eigen::Index>(effects.size());
+    Eigen::VectorXd wander = Eigen::VectorXd::Zero(n), disturbance = wander, s = wander;
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      if (log.bins[k].*readings > 0) {
+        w.reading(static_cast<double>(log.bins[k].*readings));
+        for (Eigen::Index i = 0; i < n; ++i) {
+          double& K = (effects[static_cast<std::size_t>(i)].*channel)[l][k];
+          s[i] = K = (K - wander[i] - disturbance[i]) * w.weight;
+        }
+        wander += w.gain / w.weight * s;
+        disturbance += w.gain_disturbed / w.weight * s;
+        sum += s * s.transpose();
+      }
+      w.step();
+      wander *= w.keep;
+      disturbance *= w.keep_disturbed;
+    }
   }
 };
 
@@ -173,7 +187,7 @@ struct Sums {
   Dual<N> H[N] = {};  // rows of products of sensitivities; values: with the residual
   double misfit = 0;
   int readings = 0;
-  Dual<N> with_late = {};  // products of residual and sensitivities with the leeway's s
+  Dual<N> with_averaged[Averaged::most] = {};  // products of residual and sensitivities with what is averaged over
 };
 
 /// What the filter predicts of a residual and of its sensitivities.
@@ -182,10 +196,10 @@ struct Predicted {
   Dual<N> wander = 0, disturbance = 0;
 };
 
-/// Adds one channel's bin to the sums; n readings, 0: none. `late`: the leeway's s.
+/// Adds one channel's bin k of log l to the sums; n readings, 0: none.
 template <int N>
 void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& simulated, double measured, double n,
-         double late) {
+         const Averaged& averaged, std::vector<std::vector<double>> Leeway::*channel, std::size_t l, std::size_t k) {
   const bool disturbed = w.disturbance2 > 0;
   if (n > 0) {
     w.reading(n);
@@ -197,7 +211,8 @@ void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& sim
     sums.misfit += 0.5 * e.v * e.v;
     ++sums.readings;
     for (int i = 0; i < N; ++i) sums.H[i] += e * e.slope(i);
-    if (late != 0) sums.with_late += e * late;
+    for (std::size_t i = 0; i < averaged.effects.size(); ++i)
+      sums.with_averaged[i] += e * (averaged.effects[i].*channel)[l][k];
   }
   w.step();
   predicted.wander *= w.keep;
@@ -212,16 +227,17 @@ struct Evaluation {
 };
 
 template <int N>
-bool evaluate(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
-              Evaluation& out) {
+bool evaluate(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
+              const Eigen::VectorXd& x, Evaluation& out) {
   const int shared = base_count + coordinates_of(chosen);
   const int all = static_cast<int>(x.size());
   out.misfit = 0;
   out.readings = 0;
   out.gradient = Eigen::VectorXd::Zero(all);
   out.information = Eigen::MatrixXd::Zero(all, all);
-  Eigen::VectorXd with_late = Eigen::VectorXd::Zero(all);
-  double residual_with_late = 0;
+  const auto effects = static_cast<Eigen::Index>(averaged.effects.size());
+  Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, effects);
+  Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(effects);
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
     const int own = shared + per_log_count * static_cast<int>(l);
@@ -240,9 +256,10 @@ bool evaluate(const Problem& problem, const Leeway& leeway, const std::vector<Ch
                          const Bin& bin = log.bins[k];
                          finite = finite && std::abs(y2.v) < 1e5 && std::abs(y1.v) < 1e5;
                          add<N>(sums, housing, of_housing, y2, bin.housing_degC, static_cast<double>(bin.housing_n),
-                                leeway.late.empty() ? 0 : leeway.late[l][k]);
+                                averaged, &Leeway::housing_K, l, k);
                          if (log.has_core)
-                           add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n), 0);
+                           add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n), averaged,
+                                  &Leeway::core_K, l, k);
                        });
     if (!finite || !std::isfinite(sums.misfit)) return false;
     out.misfit += sums.misfit;
@@ -254,22 +271,23 @@ bool evaluate(const Problem& problem, const Leeway& leeway, const std::vector<Ch
         out.information(place(i), place(j)) += sums.H[i].slope(j);
         if (i != j) out.information(place(j), place(i)) += sums.H[i].slope(j);
       }
-      with_late[place(i)] += sums.with_late.slope(i);
+      for (Eigen::Index e = 0; e < effects; ++e) with_averaged(place(i), e) += sums.with_averaged[e].slope(i);
     }
-    residual_with_late += sums.with_late.v;
+    for (Eigen::Index e = 0; e < effects; ++e) residual_with_averaged[e] += sums.with_averaged[e].v;
   }
-  out.misfit -= 0.5 * leeway.share * residual_with_late * residual_with_late;
-  out.gradient -= leeway.share * residual_with_late * with_late;
-  out.information -= leeway.share * with_late * with_late.transpose();
+  const Eigen::VectorXd explained = averaged.inverse * residual_with_averaged;
+  out.misfit -= 0.5 * residual_with_averaged.dot(explained);
+  out.gradient -= with_averaged * explained;
+  out.information -= with_averaged * averaged.inverse * with_averaged.transpose();
   return true;
 }
 
-bool evaluate_any(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen,
+bool evaluate_any(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
                   const Eigen::VectorXd& x, Evaluation& out) {
   const int n = base_count + coordinates_of(chosen) + per_log_count;
-  if (n <= 6) return evaluate<6>(problem, leeway, chosen, x, out);
-  if (n <= 8) return evaluate<8>(problem, leeway, chosen, x, out);
-  return evaluate<10>(problem, leeway, chosen, x, out);  // two causes have four parameters at most
+  if (n <= 6) return evaluate<6>(problem, averaged, chosen, x, out);
+  if (n <= 8) return evaluate<8>(problem, averaged, chosen, x, out);
+  return evaluate<10>(problem, averaged, chosen, x, out);  // two causes have four parameters at most
 }
 
 double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
@@ -288,7 +306,7 @@ void decouple(Eigen::MatrixXd& A, Eigen::Index i, double diagonal) {
   A(i, i) = diagonal;
 }
 
-Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chosen>& chosen,
+Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
             const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
   const Eigen::Index n = x.size();
   Fit out;
@@ -296,7 +314,7 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
   Evaluation now, trial;
   for (Eigen::Index i = 0; i < n; ++i)
     x[i] = std::clamp(x[i], c[static_cast<std::size_t>(i)].low, c[static_cast<std::size_t>(i)].high);
-  if (!evaluate_any(problem, leeway, chosen, x, now)) return out;
+  if (!evaluate_any(problem, averaged, chosen, x, now)) return out;
   double cost = now.misfit + prior_cost(c, x), damping = 1e-3;
   Eigen::VectorXd g(n);
   Eigen::MatrixXd H(n, n);
@@ -338,7 +356,7 @@ Fit descend(const Problem& problem, const Leeway& leeway, const std::vector<Chos
         const Coordinate& ci = c[static_cast<std::size_t>(i)];
         next[i] = std::clamp(x[i] + std::clamp(dx[i], -2 * ci.sd, 2 * ci.sd), ci.low, ci.high);
       }
-      if (evaluate_any(problem, leeway, chosen, next, trial)) {
+      if (evaluate_any(problem, averaged, chosen, next, trial)) {
         const double next_cost = trial.misfit + prior_cost(c, next);
         if (next_cost < cost) {
           // A step that delivers little of what it promised overshot a curved valley: R1 C1 is known, R1 alone hardly.
@@ -420,7 +438,7 @@ Eigen::MatrixXd Fit::covariance(bool bounds_hold) const {
 
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm, int most) {
   const auto c = layout(problem, chosen);
-  const Leeway leeway(problem);
+  const Averaged averaged(problem);
   const auto n = static_cast<Eigen::Index>(c.size());
   Eigen::VectorXd x(n);
   for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
@@ -449,10 +467,10 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     at += parameters;
   }
   if (last_is_known) {
-    Fit best = descend(problem, leeway, chosen, c, x, most);
+    Fit best = descend(problem, averaged, chosen, c, x, most);
     if (warm.size() > 0 || best.x.size() == 0) return best;
     const auto start_at = [&](const Eigen::VectorXd& other) {
-      Fit f = descend(problem, leeway, chosen, c, other, most);
+      Fit f = descend(problem, averaged, chosen, c, other, most);
       if (f.cost < best.cost) best = std::move(f);
     };
     // Where the winding is fast and read now and then, too small a capacity has a valley of its own.
@@ -472,14 +490,14 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   Fit best;
   for (const auto& start : starts) {
     for (std::size_t p = 0; p < start.size(); ++p) x[last + static_cast<Eigen::Index>(p)] = start[p];
-    Fit f = descend(problem, leeway, chosen, c, x, starts.size() > 1 ? std::min(look, most) : most);
+    Fit f = descend(problem, averaged, chosen, c, x, starts.size() > 1 ? std::min(look, most) : most);
     if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
   }
   if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;
-  return descend(problem, leeway, chosen, c, best.x, most);
+  return descend(problem, averaged, chosen, c, best.x, most);
 }
 
-std::vector<std::vector<double>> ordinary_lateness_K(const Problem& problem, const Fit& two_resistors) {
+std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors) {
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
   constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
@@ -487,18 +505,27 @@ std::vector<std::vector<double>> ordinary_lateness_K(const Problem& problem, con
   late.chosen = {{cause_named("sensor_lag"), -1}};
   late.x.resize(two_resistors.x.size() + 1);
   late.x << two_resistors.x.head(base_count), tried_s, two_resistors.x.tail(two_resistors.x.size() - base_count);
-  std::vector<std::vector<double>> out;
+  Problem uneven = problem;
+  uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
+  Leeway lateness, phases;
+  const auto off_K = [](std::vector<double> moved, const std::vector<double>& plain, double times) {
+    for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
+    return moved;
+  };
   for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
-    const auto on_time = replayed(problem, two_resistors, l).housing_degC;
-    auto off_K = replayed(problem, late, l).housing_degC;
-    for (std::size_t k = 0; k < off_K.size(); ++k) off_K[k] = (off_K[k] - on_time[k]) * late_s / tried_s;
-    out.push_back(std::move(off_K));
+    const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
+                   warmed = replayed(uneven, two_resistors, l);
+    lateness.housing_K.push_back(off_K(lagged.housing_degC, plain.housing_degC, late_s / tried_s));
+    lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
+    phases.housing_K.push_back(off_K(warmed.housing_degC, plain.housing_degC, 1));
+    phases.core_K.push_back(off_K(warmed.core_degC, plain.core_degC, 1));
   }
-  return out;
+  if (!(problem.uneven_per_A2 > 0)) return {lateness};
+  return {lateness, phases};
 }
 
 double cost_of_noise(const Problem& problem) {
-  double sum = 0.5 * Leeway(problem).log_determinant;
+  double sum = 0.5 * Averaged(problem).log_determinant;
   for (const Bins& log : problem.logs) {
     Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
     const auto add = [&](Whitener& channel, double readings) {
@@ -528,7 +555,7 @@ Fit transferred(const Problem& other, const Fit& from) {
     ci.prior = ci.low = ci.high = ci.start;
     x[i] = ci.start;
   }
-  return descend(other, Leeway(other), from.chosen, c, x, 30);
+  return descend(other, Averaged(other), from.chosen, c, x, 30);
 }
 
 Physical physical(const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
@@ -586,7 +613,7 @@ Error error_of(const std::vector<double>& residual_K) {
 double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
                  Eigen::VectorXd* gradient) {
   Evaluation e;
-  if (!evaluate_any(problem, Leeway(problem), chosen, x, e)) return 1e300;
+  if (!evaluate_any(problem, Averaged(problem), chosen, x, e)) return 1e300;
   if (gradient != nullptr) *gradient = e.gradient;
   return e.misfit;
 }

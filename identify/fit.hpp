@@ -46,9 +46,10 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
         int most = 60);
 
 /// What no motor is without: a housing that is not one mass and a sensor that is not quite on it, so that its reading
-/// comes early or late by seconds. How far a lateness of ordinary size puts it off, K, for each log and bin; causes
-/// are to be ranked by more than that. `two_resistors`: the baseline's fit.
-std::vector<std::vector<double>> ordinary_lateness_K(const Problem& problem, const Fit& two_resistors);
+/// comes early or late by seconds; and, where the rotor stands under load, phases that share their heat better or worse
+/// than was assumed. Causes are to be ranked by more than that. The lateness comes first. `two_resistors`: the
+/// baseline's fit.
+std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors);
 
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.

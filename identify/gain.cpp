@@ -164,29 +164,29 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
               .ambient_degC = work[Boundary::ambient]};
 }
 
-const Fit& most_cautious(const Problem& problem, const std::vector<const Fit*>& fits) {
-  if (problem.heated_by_power()) return *fits.front();
+const Offer& most_cautious(const Problem& problem, const std::vector<Offer>& offers) {
+  if (problem.heated_by_power()) return offers.front();
   const thermal::HeatInput<> work = working_point(problem);
   const double most_A = asked_over_rms * problem.rms_A;
   // One current for all, above what any of them carries for an hour.
   double burst_A = 0;
   std::vector<std::optional<thermal::HeatSet<double>>> sets;
   const auto answers = [&](std::size_t i, double at_A) {
-    return answers_of(*sets[i], trust_of(problem, *fits[i]), *sets[i], work, most_A, at_A);
+    return answers_of(*sets[i], offers[i].trust, *sets[i], work, most_A, at_A);
   };
-  for (std::size_t i = 0; i < fits.size(); ++i) {
-    sets.emplace_back(heat_set_of(problem, *fits[i]));
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    sets.emplace_back(heat_set_of(problem, *offers[i].fit));
     if (!thermal::validate(*sets[i], estimator_dt_s).ok())
       sets[i].reset();
     else
       burst_A = std::max(burst_A, burst_over_continuous * answers(i, 0).continuous_A);
   }
-  const Fit* best = fits.front();
+  const Offer* best = &offers.front();
   double least_s = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < fits.size(); ++i) {
+  for (std::size_t i = 0; i < offers.size(); ++i) {
     if (!sets[i] || !(burst_A > 0)) continue;
     const double s = answers(i, burst_A).burst_s;
-    if (s < least_s) least_s = s, best = fits[i];
+    if (s < least_s) least_s = s, best = &offers[i];
   }
   return *best;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "identify/report.hpp"
+#include "thermal/core_estimator.hpp"
 
 namespace identify {
 
@@ -14,8 +15,14 @@ namespace identify {
 /// `extended` is taken for the truth.
 std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const Fit& extended);
 
-/// The fit under which a board bears a push for the shortest time: the one to write where the data cannot choose. A set
-/// that the firmware refuses is passed over; the first where none can be asked (heat logged as power).
-const Fit& most_cautious(const Problem& problem, const std::vector<const Fit*>& fits);
+/// What a board may be given.
+struct Offer {
+  const Fit* fit;
+  thermal::Trust trust;
+};
+
+/// The offer under which a board bears a push for the shortest time: the one to write where the data cannot choose. A
+/// set that the firmware refuses is passed over; the first where none can be asked (heat logged as power).
+const Offer& most_cautious(const Problem& problem, const std::vector<Offer>& offers);
 
 }  // namespace identify

@@ -96,8 +96,9 @@ HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::Motor
   }
   out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
   // Scales and belief are those the parameters were found with; only the inputs are new.
-  Problem other = whole;
-  other.logs = problem_of(held.logs, motor, whole.belief.copper_per_K).logs;
+  Problem other = whole, unseen = problem_of(held.logs, motor, whole.belief.copper_per_K);
+  unseen.warm_unevenly(whole.uneven_per_A2);
+  other.logs = std::move(unseen.logs);
   // What is of one of the fitted logs (a fan) is not of these.
   Fit elsewhere = extended;
   for (Chosen& c : elsewhere.chosen) c.log = -1;

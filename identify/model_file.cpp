@@ -80,8 +80,7 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
   return set;
 }
 
-thermal::Trust trust_of(const Problem& problem, const Fit& f) {
-  const auto& least = thermal::identified_trust;
+thermal::Trust trust_of(const Problem& problem, const Fit& f, const thermal::Trust& least) {
   const Eigen::MatrixXd doubt = doubts(f);
   const auto unit = [&](int coordinate) -> Eigen::VectorXd { return Eigen::VectorXd::Unit(f.x.size(), coordinate); };
   // Slopes of logarithms: heat against capacity goes as 1/C1, what flows on against capacity as 1/(R1 C1).
@@ -105,7 +104,8 @@ thermal::Trust trust_of(const Problem& problem, const Fit& f) {
           share(together(unit(1), unit(1)), least.cooling)};
 }
 
-std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence) {
+std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence,
+                          const thermal::Trust& trust) {
   const Model<double> m = model_of(problem, f, 0);
   const thermal::HeatSet<double> set = heat_set_of(problem, f);
   std::string s = "# " + sentence + "\n";
@@ -139,7 +139,6 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   }
   s += fmt::format("\n[housing_sensor]\nnode = {}\nlag_s = {:.6g}\noffset_K = {:.6g}\ngain_error = {:.6g}\n",
                    int{set.housing.node}, set.housing.lag_s, set.housing.offset_K, set.housing.gain_error);
-  const thermal::Trust trust = trust_of(problem, f);
   s += fmt::format("\n[trust]\npower = {:.3f}\ninner_resistance = {:.3f}\ncooling = {:.3f}\n", trust.power,
                    trust.inner_resistance, trust.cooling);
   std::string recording;

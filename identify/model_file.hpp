@@ -15,11 +15,13 @@ namespace identify {
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& fit);
 
 /// How far the board may trust the set: standard errors of the fit, the causes' own where they stand between a sensor
-/// and the hottest node, widened where it leaves more than noise, and never better than what such a fit is worth
-/// (thermal::identified_trust).
-thermal::Trust trust_of(const Problem& problem, const Fit& fit);
+/// and the hottest node, widened where it leaves more than noise, and never better than `least`: what such a fit is
+/// worth, or a sheet where the data does not bear out what was fitted.
+thermal::Trust trust_of(const Problem& problem, const Fit& fit,
+                        const thermal::Trust& least = thermal::identified_trust);
 
 /// `sentence`: what was found, written as a comment at the top.
-std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence);
+std::string heat_set_toml(const Problem& problem, const Fit& fit, const std::string& sentence,
+                          const thermal::Trust& trust);
 
 }  // namespace identify

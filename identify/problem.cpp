@@ -171,6 +171,13 @@ bool Problem::any_core() const {
   return std::any_of(logs.begin(), logs.end(), [](const Bins& b) { return b.has_core; });
 }
 
+void Problem::warm_unevenly(double per_A2) {
+  for (Bins& log : logs) {
+    for (Bin& bin : log.bins) bin.input[Drive::current_A2] += (per_A2 - uneven_per_A2) * bin.stalled_A4;
+  }
+  uneven_per_A2 = per_A2;
+}
+
 double Problem::scale(Scale s, Drive d) const {
   switch (s) {
     case Scale::one:
@@ -277,6 +284,12 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   }
   if (!motor) rough_search(problem);
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
+  // A standing rotor's phases take unequal heat P_k and warm unequally, and the warmer ones then take more still:
+  // wherever it stands, alpha R_u sum (P_k - P/3)^2 = alpha R_u P^2 / 6 above P, the heat of equal phases. Between one
+  // phase and the others lies R_u: 0 where they share their heat at once, 3 R1 where they share none. The middle is
+  // assumed.
+  const Belief& b = problem.belief;
+  if (!problem.heated_by_power()) problem.warm_unevenly(b.copper_per_K * 1.5 * b.R1_K_per_W * b.ohm / 6);
   return problem;
 }
 

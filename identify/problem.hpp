@@ -35,14 +35,19 @@ struct Noise {
   double idle_s = 0;                             // how much rest it was taken from; 0: assumed
 };
 
+/// What no motor is without and no cause is to be named for: how far its ordinary size moves the readings, for each log
+/// and bin. A fit averages over it (prior standard deviation 1 in that unit).
+struct Leeway {
+  std::vector<std::vector<double>> housing_K, core_K;
+};
+
 struct Problem {
   std::vector<Bins> logs;
   Belief belief;
   Noise noise;
-  /// For each log and bin, how far an ordinary lateness puts the housing's reading off: a fit averages over late and
-  /// early (prior standard deviation 1 in that unit). Empty: readings are on time.
-  std::vector<std::vector<double>> lateness_K;
-  double heat_W = 1;  // mean copper heat, and means of the drives: the scales of cause.hpp
+  std::vector<Leeway> leeway;  // what fits average over
+  double uneven_per_A2 = 0;    // times i^4: what the uneven phases of a standing rotor heat more than i^2 says
+  double heat_W = 1;           // mean copper heat, and means of the drives: the scales of cause.hpp
   double drive_mean[thermal::drive_count] = {};
   double rms_A = 1, speed08_mean = 1, duration_s = 1;
 
@@ -50,6 +55,7 @@ struct Problem {
   bool any_core() const;
   double scale(Scale s, thermal::Drive drive) const;
   bool possible(const Cause& cause) const;  // the logs hold what it needs
+  void warm_unevenly(double per_A2);        // changes the inputs to this uneven_per_A2
 };
 
 /// Bins the logs, takes the noise from rest, and settles the belief (from the sheet, or from the data by a rough

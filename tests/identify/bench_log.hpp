@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Makes logs for tests, apart from all that identify does: its own equations (explicit Runge-Kutta of fourth order at
-// 20 ms), its own noise on raw samples, its own profile. Written as a file, which is all the program gets.
+// 20 ms), its own noise on raw samples, its own profile. The rotor stands, direct current flows in at one phase and out
+// at another. Written as a file, which is all the program gets.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -13,9 +15,10 @@
 
 namespace tests {
 
-/// EC 16 surrogate: 3/2 of a phase's resistance, 1/K, K/W, J/K.
+/// EC 16 surrogate: 3/2 of a phase's resistance, 1/K, K/W, J/K; between each two phases this share of what lies between
+/// the winding and the housing.
 struct BenchMotor {
-  double ohm = 1.5 * 0.5, copper = 0.00393, R1 = 1.08, R2 = 16.3, C1 = 1.13, C2 = 18.0;
+  double ohm = 1.5 * 0.5, copper = 0.00393, R1 = 1.08, R2 = 16.3, C1 = 1.13, C2 = 18.0, coupling = 0.1;
 };
 
 struct BenchOptions {
@@ -39,7 +42,10 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
   out << "time_s," << (o.power_gain > 0 ? "power_W" : "current_A") << ",speed_rad_per_s,housing_degC,ambient_degC";
   if (o.core_every_s > 0) out << ",core_degC";
   out << "\n";
-  double T1 = o.start_degC, T2 = o.start_degC, slow = o.slow_K * normal(random), current = 0, until = 0;
+  using State = std::array<double, 4>;  // three phases, housing
+  State T;
+  T.fill(o.start_degC);
+  double slow = o.slow_K * normal(random), current = 0, until = 0;
   const double dt = 0.02;
   const int per_row = static_cast<int>(std::lround(1 / (o.rate_Hz * dt)));
   const double keep = std::exp(-1 / (o.rate_Hz * 20));
@@ -57,34 +63,44 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
       until = t < 30 ? 30 : t + 5 + 55 * uniform(random);
     }
     slow = keep * slow + std::sqrt(1 - keep * keep) * o.slow_K * normal(random);
-    double housing = T2 + slow + o.white_K * normal(random);
+    const double core = (T[0] + T[1] + T[2]) / 3;
+    double housing = T[3] + slow + o.white_K * normal(random);
     if (o.step_K > 0) housing = o.step_K * std::round(housing / o.step_K);
     const double amplitude = current * 2 / std::sqrt(3.0);
     const double heat25 = m.ohm * amplitude * amplitude;
-    out << t << ',' << (o.power_gain > 0 ? heat25 * (1 + m.copper * (T1 - 25)) * o.power_gain : current) << ",0,"
-        << housing << ',' << o.ambient_degC;
+    const auto phase_W = [&](const State& at, int k) {
+      return k == 2 ? 0 : heat25 / 2 * (1 + m.copper * (at[k] - 25));
+    };
+    out << t << ',' << (o.power_gain > 0 ? (phase_W(T, 0) + phase_W(T, 1)) * o.power_gain : current) << ",0," << housing
+        << ',' << o.ambient_degC;
     if (o.core_every_s > 0) {
       out << ',';
       if (row >= next_core) {
-        out << T1 + o.core_white_K * normal(random);
+        out << core + o.core_white_K * normal(random);
         next_core = row + std::lround(o.core_every_s * o.rate_Hz);
       }
     }
     out << '\n';
     for (int i = 0; i < per_row; ++i) {
-      const auto slope = [&](double a, double b, double& da, double& db) {
-        da = (heat25 * (1 + m.copper * (a - 25)) - (a - b) / m.R1) / m.C1;
-        db = ((a - b) / m.R1 - (b - o.ambient_degC) / m.R2 +
-              (o.extra_housing_W ? o.extra_housing_W(t, current, b) : 0)) /
-             m.C2;
+      const auto slope = [&](const State& at) {
+        State d{};
+        for (int k = 0; k < 3; ++k) {
+          const double out_W = (at[k] - at[3]) / (3 * m.R1);
+          const double across_W = m.coupling / m.R1 * (2 * at[k] - at[(k + 1) % 3] - at[(k + 2) % 3]);
+          d[k] = (phase_W(at, k) - out_W - across_W) / (m.C1 / 3);
+          d[3] += out_W;
+        }
+        d[3] += (o.ambient_degC - at[3]) / m.R2 + (o.extra_housing_W ? o.extra_housing_W(t, current, at[3]) : 0);
+        d[3] /= m.C2;
+        return d;
       };
-      double a1, b1, a2, b2, a3, b3, a4, b4;
-      slope(T1, T2, a1, b1);
-      slope(T1 + dt / 2 * a1, T2 + dt / 2 * b1, a2, b2);
-      slope(T1 + dt / 2 * a2, T2 + dt / 2 * b2, a3, b3);
-      slope(T1 + dt * a3, T2 + dt * b3, a4, b4);
-      T1 += dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
-      T2 += dt / 6 * (b1 + 2 * b2 + 2 * b3 + b4);
+      const auto ahead = [&](const State& d, double h) {
+        State at = T;
+        for (int k = 0; k < 4; ++k) at[k] += h * d[k];
+        return at;
+      };
+      const State a = slope(T), b = slope(ahead(a, dt / 2)), c = slope(ahead(b, dt / 2)), d = slope(ahead(c, dt));
+      for (int k = 0; k < 4; ++k) T[k] += dt / 6 * (a[k] + 2 * b[k] + 2 * c[k] + d[k]);
     }
   }
   return path;

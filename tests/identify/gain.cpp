@@ -2,7 +2,8 @@
 // Does the model that identify finds help the motor it was found on? For each seed: record a hidden motor through the
 // firmware under protection, let identify read the log, and play a push that outlasts the winding with the two-resistor
 // model as fitted, with the model found, and with an oracle that knows the true winding temperature.
-//   build/host/bin/gain --seeds 40 [--first 1] [--excitation duty|designed] [--minutes 20] [--json]
+//   build/host/bin/gain --seeds 40 [--first 1] [--excitation duty|designed] [--minutes 20] [--clean] [--json]
+// --clean: the motor of the sheet, nothing hidden. Two resistors are then to be called adequate.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -33,7 +34,7 @@ struct Push {
 struct Case {
   std::uint64_t seed;
   std::string truth, answer;
-  bool misnamed;  // told what it is, and the truth is not in it
+  bool misnamed;  // told what it is, and the truth is not in it; or, with nothing hidden, anything but adequate
   Push before, after;
 };
 
@@ -47,8 +48,9 @@ Trace push(const HiddenMotor& motor, Limiter limiter, const std::string& model) 
   return run_scene(scene, options).traces.at(0);
 }
 
-Case played(RecordOptions options, std::uint64_t seed, const std::string& folder) {
-  options.hide = options.seed = seed;
+Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::string& folder) {
+  options.seed = seed;
+  if (!clean) options.hide = seed;
   const Recording recording = record(options);
   const std::string log = folder + "/log.csv", before = folder + "/before.toml", after = folder + "/after.toml";
   wire::pc::write_whole(log, recording.log_csv);
@@ -57,7 +59,8 @@ Case played(RecordOptions options, std::uint64_t seed, const std::string& folder
   wire::pc::write_whole(before, report.baseline_toml);
   wire::pc::write_whole(after, report.model_toml);
 
-  const HiddenMotor motor = hidden_motor(seed, options.motor, options.motor_folder);
+  const HiddenMotor motor =
+      clean ? HiddenMotor{sheet.motor, {}, {}} : hidden_motor(seed, options.motor, options.motor_folder);
   const double limit_degC = sheet.motor.winding_max_degC;
   const double best_As = push(motor, Limiter::oracle, "").impulse_As;
   const auto outcome = [&](const std::string& model) {
@@ -65,9 +68,9 @@ Case played(RecordOptions options, std::uint64_t seed, const std::string& folder
     return Push{std::max(0.0, trace.hottest_true_degC - limit_degC), trace.impulse_As / best_As};
   };
   Case c{.seed = seed,
-         .truth = nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
+         .truth = clean ? "nothing" : nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
          .answer = report.verdict,
-         .misnamed = report.verdict.ends_with("explained"),
+         .misnamed = clean ? report.verdict != "adequate" : report.verdict.ends_with("explained"),
          .before = outcome(before),
          .after = outcome(after)};
   for (const auto& cause : report.causes) {
@@ -83,12 +86,13 @@ int main(int argc, char** argv) {
   CLI::App app{"What identify's model gains on the motor that was recorded, in host-sim"};
   int seeds = 10;
   std::uint64_t first = tests::rotating_seed();
-  bool json = false, check = false;
+  bool json = false, check = false, clean = false;
   RecordOptions options{.motor_folder = root + "/boards/motors", .scene_folder = root + "/host-sim/scenes"};
   app.add_option("--seeds", seeds, "motors")->capture_default_str();
   app.add_option("--first", first, "first seed")->capture_default_str();
   app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
   app.add_option("--minutes", options.minutes, "of each log")->capture_default_str();
+  app.add_flag("--clean", clean, "nothing is hidden in the motors");
   app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
   app.add_flag(
       "--check", check,
@@ -101,7 +105,7 @@ int main(int argc, char** argv) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   int missed = 0, helped = 0, harmed = 0, too_hot = 0, misnamed = 0;
   for (int s = 0; s < seeds; ++s) {
-    const Case c = played(options, first + static_cast<std::uint64_t>(s), folder);
+    const Case c = played(options, clean, first + static_cast<std::uint64_t>(s), folder);
     missed += !c.before.kept();
     helped += !c.before.kept() && c.after.kept();
     const bool hotter = c.after.overshoot_K > std::max(most_overshoot_K, c.before.overshoot_K);

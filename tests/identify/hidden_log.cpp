@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <stdexcept>
@@ -168,6 +169,7 @@ Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const 
   stove.soak(start_degC);
   stove.around.ambient_degC = ambient_degC;
   Track out;
+  double angle_rad = host_sim::Random(seed).uniform(0, 2 * std::numbers::pi);
   const auto late = static_cast<long>(std::lround(hidden.clock_delay_s / row_s));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     out.core.push_back(stove.copper_degC());
@@ -175,8 +177,15 @@ Track run(const wire::Motor& truth, const host_sim::HeatOptions& options, const 
     out.sensed.push_back(stove.sensed_degC());
     const Row row = static_cast<long>(i) >= late ? rows[i - static_cast<std::size_t>(late)] : Row{0, 0};
     const double amps = row.current_A + hidden.current_offset_A, w = std::abs(row.speed_rad_per_s);
+    // Where the rotor stands its phases share the heat by its angle; turning, alike.
+    const double advance_rad = truth.pole_pairs * row.speed_rad_per_s * row_s;
+    angle_rad = std::remainder(angle_rad + advance_rad, 2 * std::numbers::pi);
     host_sim::HeatDrive drive;
-    for (int k = 0; k < 3; ++k) drive.copper_W[static_cast<std::size_t>(k)] = 0.5 * stove.phase_ohm(k, w) * amps * amps;
+    for (int k = 0; k < 3; ++k) {
+      const double along = std::sin(angle_rad - k * 2 * std::numbers::pi / 3);
+      const double share = std::abs(advance_rad) > 0.5 ? 0.5 : along * along;
+      drive.copper_W[static_cast<std::size_t>(k)] = share * stove.phase_ohm(k, w) * amps * amps;
+    }
     drive.current_A = std::abs(amps);
     drive.current2_A2 = amps * amps;
     drive.speed_rad_per_s = w;

@@ -166,8 +166,9 @@ TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
   identify::Fit light = found, heavy = found;
   light.x[2] -= 0.5;  // ln of the winding's capacity
   heavy.x[2] += 0.5;
-  EXPECT_EQ(&identify::most_cautious(problem, {&found, &light, &heavy}), &light);
-  EXPECT_EQ(&identify::most_cautious(problem, {&heavy, &found}), &found);
+  const auto offer = [](const identify::Fit& f) { return identify::Offer{&f, thermal::identified_trust}; };
+  EXPECT_EQ(identify::most_cautious(problem, {offer(found), offer(light), offer(heavy)}).fit, &light);
+  EXPECT_EQ(identify::most_cautious(problem, {offer(heavy), offer(found)}).fit, &found);
 }
 
 TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
