@@ -191,7 +191,6 @@ void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const I
     for (double& d : bin.input.boundary_degC) d *= scale;
     bin.signed_A *= scale;
     bin.stalled_A2 *= scale;
-    bin.stalled_A4 *= scale;
   }
 }
 
@@ -225,10 +224,7 @@ void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, do
   in[Drive::enabled] += share * (a2 > 0 || w > 0 ? 1 : 0);
   in[Drive::speed_to_0_8] += share * (w > 0 ? std::pow(w, 0.8) : 0);
   bin.signed_A += share * sampled_A;
-  if (w < stalled_rad_per_s) {
-    bin.stalled_A2 += share * a2;
-    bin.stalled_A4 += share * a2 * a2;
-  }
+  bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
 }
 
 Bins bins_of(const Log& log, double finest_s) {
@@ -261,7 +257,7 @@ Bins bins_of(const Log& log, double finest_s) {
   const Inputs in = inputs_of(log, out);
   add_inputs(out, t, usual_s, in);
   for (Bin& bin : out.bins) {
-    if (!log.has(Role::speed)) bin.stalled_A2 = bin.stalled_A4 = 0;  // it may have turned
+    if (!log.has(Role::speed)) bin.stalled_A2 = 0;  // it may have turned
   }
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
@@ -294,7 +290,7 @@ Bins merged(const Bins& log, std::size_t together) {
         all.input.boundary_degC[b] += share * bin.input.boundary_degC[b];
       all.signed_A += share * bin.signed_A;
       all.stalled_A2 += share * bin.stalled_A2;
-      all.stalled_A4 += share * bin.stalled_A4;
+      all.uneven_A4 += share * bin.uneven_A4;
       all.idle = all.idle && bin.idle;
       add_reading(bin, k, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
       add_reading(bin, k, &Bin::core_degC, &Bin::core_at, &Bin::core_n);

@@ -27,7 +27,8 @@ inline constexpr double longest_bin_s = 2;
 struct Bin {
   thermal::HeatInput<double> input;  // means over the bin
   double signed_A;                   // mean current with its sign
-  double stalled_A2, stalled_A4;     // means of i^2 and i^4 while |w| is below stalled_rad_per_s, else of 0
+  double stalled_A2;                 // mean of i^2 while |w| is below stalled_rad_per_s, else of 0
+  double uneven_A4;                  // of what warms a standing rotor's phases unequally (Problem::uneven_per_A2)
   double housing_degC, core_degC;    // mean reading, NaN: none
   float housing_at, core_at;         // where in the bin, 0..1, its mean time lies
   float housing_n, core_n;           // readings in it

@@ -165,6 +165,25 @@ double felt_winding_bin_s(const Problem& problem) {
   return sum > readings * white_K * white_K ? p.R1_K_per_W * p.C1_J_per_K / 4 : std::numeric_limits<double>::infinity();
 }
 
+/// A standing rotor's phases take unequal heat P_k and warm unequally, and the warmer ones then take more still:
+/// wherever it stands, alpha R_u sum (P_k - P/3)^2 = alpha R_u P^2 / 6 above P, the heat of equal phases, with one P as
+/// long ago as phases of C1/3 need to warm. Between one phase and the others lies R_u: 0 where they share their heat at
+/// once, 3 R1 where they share none. The middle is assumed.
+void warm_phases_unequally(Problem& problem) {
+  const Belief& b = problem.belief;
+  const double R_u_K_per_W = 1.5 * b.R1_K_per_W, tau_s = R_u_K_per_W * b.C1_J_per_K / 3;
+  for (Bins& log : problem.logs) {
+    const double keep = std::exp(-log.width_s / tau_s), mean_keep = (1 - keep) * tau_s / log.width_s;
+    double warmed_A2 = 0;
+    for (Bin& bin : log.bins) {
+      const double ahead_A2 = warmed_A2 - bin.stalled_A2;
+      bin.uneven_A4 = bin.stalled_A2 * (bin.stalled_A2 + mean_keep * ahead_A2);
+      warmed_A2 = bin.stalled_A2 + keep * ahead_A2;
+    }
+  }
+  problem.warm_unevenly(b.copper_per_K * R_u_K_per_W * b.ohm / 6);
+}
+
 }  // namespace
 
 bool Problem::any_core() const {
@@ -173,7 +192,7 @@ bool Problem::any_core() const {
 
 void Problem::warm_unevenly(double per_A2) {
   for (Bins& log : logs) {
-    for (Bin& bin : log.bins) bin.input[Drive::current_A2] += (per_A2 - uneven_per_A2) * bin.stalled_A4;
+    for (Bin& bin : log.bins) bin.input[Drive::current_A2] += (per_A2 - uneven_per_A2) * bin.uneven_A4;
   }
   uneven_per_A2 = per_A2;
 }
@@ -284,12 +303,7 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   }
   if (!motor) rough_search(problem);
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
-  // A standing rotor's phases take unequal heat P_k and warm unequally, and the warmer ones then take more still:
-  // wherever it stands, alpha R_u sum (P_k - P/3)^2 = alpha R_u P^2 / 6 above P, the heat of equal phases. Between one
-  // phase and the others lies R_u: 0 where they share their heat at once, 3 R1 where they share none. The middle is
-  // assumed.
-  const Belief& b = problem.belief;
-  if (!problem.heated_by_power()) problem.warm_unevenly(b.copper_per_K * 1.5 * b.R1_K_per_W * b.ohm / 6);
+  if (!problem.heated_by_power()) warm_phases_unequally(problem);
   return problem;
 }
 

@@ -552,7 +552,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   // Believed closer, what a motor has and no cause in the table is would count: a frame, teeth, a sensor's own offset.
   const Problem less = believed_less(judged, chosen, 1);
   out.still = fit(less, {}, {&found.base.fit}).surprise() - fit(less, chosen, {&found.chosen.fit}).surprise();
-  out.believed = out.explains > margins.detect && out.still > margins.second;
+  out.believed = out.explains > margins.detect && out.still > margins.still;
   out.by_parts = gained_by_parts(less, found.chosen.fit);
   out.steady = out.by_parts < margins.parts;
   out.complete = left.gain < margins.remains && out.steady;
@@ -582,7 +582,7 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
 
 /// A board runs the model alone, for long and on other loads: what is handed on is fitted without leeway for lateness,
 /// to the noise that was judged by and no closer than such a model can be right.
-void refit_for_the_board(Problem judged, Search& out) {
+void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   judged.leeway.erase(judged.leeway.begin());
   // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
   const auto refit = [&](Fit& f) {
@@ -597,13 +597,18 @@ void refit_for_the_board(Problem judged, Search& out) {
     if (c.tied) refit(c.fit);
   }
   if (out.verdict != Verdict::adequate) return;
-  // Too little for a name, and yet as likely as two resistors: a board must not take it for excluded.
-  for (Candidate& c : out.singles) {
-    if (!(c.gain > 0)) continue;
-    refit(c.fit);
-    const Problem less = believed_less(judged, c.fit.chosen, 1);
-    c.tied = c.fit.x.size() > 0 && fit(less, {}, {&out.base.fit}).surprise() > c.fit.surprise();
+  // Too little for a name, and yet likelier than two resistors: a board must not take it for excluded.
+  std::vector<double> likelier(out.singles.size(), 0.0);
+  for (std::size_t i = 0; i < likelier.size(); ++i) {
+    Fit& f = out.singles[i].fit;
+    if (!(out.singles[i].gain > 0)) continue;
+    refit(f);
+    const Problem less = believed_less(judged, f.chosen, 1);
+    if (f.x.size() > 0) likelier[i] = fit(less, {}, {&out.base.fit}).surprise() - f.surprise();
   }
+  const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
+  for (std::size_t i = 0; i < likelier.size(); ++i)
+    out.singles[i].tied = likelier[i] > std::max(0.0, most - margins.tie);
 }
 
 }  // namespace
@@ -647,7 +652,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
       fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
   const Disturbance without_causes = disturbance_of(problem, out.base.fit);
   if (ends_without_a_name(problem, field, without_causes, margins, out)) {
-    refit_for_the_board(problem, out);
+    refit_for_the_board(problem, margins, out);
     return out;
   }
 
@@ -687,7 +692,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     if (!left.complete && !left.mostly)
       out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }
-  refit_for_the_board(judged, out);
+  refit_for_the_board(judged, margins, out);
   return out;
 }
 

@@ -280,7 +280,7 @@ TEST(Bins, MergedTheyKeepTimeMeansAndReadings) {
     for (double& d : bin.input.drive) d = uniform(random);
     for (double& b : bin.input.boundary_degC) b = uniform(random);
     bin.signed_A = uniform(random) - 5;
-    bin.stalled_A2 = uniform(random), bin.stalled_A4 = uniform(random);
+    bin.stalled_A2 = uniform(random), bin.uneven_A4 = uniform(random);
     bin.housing_n = static_cast<float>(random() % 4), bin.core_n = k % 7 == 0 ? 1 : 0;
     bin.housing_degC = uniform(random), bin.core_degC = uniform(random);
     bin.housing_at = 0.1f * static_cast<float>(random() % 10), bin.core_at = 0.25f;
@@ -299,7 +299,7 @@ TEST(Bins, MergedTheyKeepTimeMeansAndReadings) {
           drives += h * static_cast<double>(d + 1) * b.input.drive[d];
         for (std::size_t d = 0; d < std::size(b.input.boundary_degC); ++d)
           boundaries += h * static_cast<double>(d + 1) * b.input.boundary_degC[d];
-        amps += h * (b.signed_A + 3 * b.stalled_A2 + 7 * b.stalled_A4);
+        amps += h * (b.signed_A + 3 * b.stalled_A2 + 7 * b.uneven_A4);
         readings += n + 100 * m;
         if (n > 0) housing += n * b.housing_degC, housing_s += n * place_s(b.housing_at);
         if (m > 0) core += m * b.core_degC, core_s += m * place_s(b.core_at);
