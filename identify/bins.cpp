@@ -256,8 +256,8 @@ Bins bins_of(const Log& log, double finest_s) {
   for (Bin& bin : out.bins) bin.housing_degC = bin.core_degC = missing;
   const Inputs in = inputs_of(log, out);
   add_inputs(out, t, usual_s, in);
-  for (Bin& bin : out.bins) {
-    if (!log.has(Role::speed)) bin.stalled_A2 = 0;  // it may have turned
+  if (!log.has(Role::speed)) {
+    for (Bin& bin : out.bins) bin.stalled_A2 = 0;  // it may have turned
   }
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);

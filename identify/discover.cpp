@@ -266,7 +266,7 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
 }
 
 /// What a board is given. Where the data cannot choose, it must not take the milder model for true: of sets that tie,
-/// and of two resistors and what is as likely by the log and only too little to be named, it gets the one that bears a
+/// and of two resistors and what is likelier by the log and only too little to be named, it gets the one that bears a
 /// push the shortest. Where nothing explains the log, no fit is worth more than a sheet.
 Offer for_the_board(const Problem& problem, const Search& found, Report& report) {
   const Fit& best = found.chosen.fit;

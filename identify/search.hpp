@@ -43,10 +43,11 @@ struct Margins {
 
 struct Candidate {
   Fit fit;
-  double gain = 0;                    // twice the logarithm of its evidence over the baseline's
-  double ratio = 0;                   // rms of whitened residuals, both channels
-  double explained = 0;               // share of the baseline's excess misfit that it takes away
-  bool chosen = false, tied = false;  // tied, where two resistors are adequate: a single as likely as they are
+  double gain = 0;       // twice the logarithm of its evidence over the baseline's
+  double ratio = 0;      // rms of whitened residuals, both channels
+  double explained = 0;  // share of the baseline's excess misfit that it takes away
+  bool chosen = false;
+  bool tied = false;  // as good as the best; where two resistors are adequate, likelier than they are
 };
 
 enum class Verdict { adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient };

@@ -282,7 +282,7 @@ TEST(Search, WhereTwoResistorsAreFarOffCausesStartFromTheSheetToo) {
 TEST(Search, PairsAreLookedAtAgainWhereACauseAloneStayedInAPoorValley) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   expect_named({.duty = tests::Duty::designed, .seed = 850029, .effects = {"board_heat", "frame_conduction"}},
-               "frame_conduction + hot_spot after one round");
+               "on the log of seed 850027 with equal phases: frame_conduction + hot_spot after one round");
 }
 
 TEST(Search, TheBaselineDoesNotStayInAPoorValley) {
