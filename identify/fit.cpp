@@ -224,6 +224,7 @@ struct Evaluation {
   int readings = 0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information;
+  Eigen::VectorXd leeway;  // what the residuals show of each effect averaged over
 };
 
 template <int N>
@@ -279,6 +280,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
   out.misfit -= 0.5 * residual_with_averaged.dot(explained);
   out.gradient -= with_averaged * explained;
   out.information -= with_averaged * averaged.inverse * with_averaged.transpose();
+  out.leeway = -explained;
   return true;
 }
 
@@ -384,6 +386,10 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
     narrowed.col(i) *= sd;
     if (held[static_cast<std::size_t>(i)]) decouple(narrowed, i, 1);
   }
+  for (Eigen::Index i = 0; i < now.leeway.size(); ++i)
+    out.uneven_per_A2 += now.leeway[i] * problem.leeway[static_cast<std::size_t>(i)].uneven_per_A2;
+  // From phases that share their heat at once to phases that share none (problem.cpp).
+  out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
   out.narrowing = narrowed.ldlt().vectorD().array().abs().log().sum();
   out.x = x;
   out.gradient = g;
@@ -508,6 +514,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resis
   Problem uneven = problem;
   uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
   Leeway lateness, phases;
+  phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   const auto off_K = [](std::vector<double> moved, const std::vector<double>& plain, double times) {
     for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
     return moved;
@@ -555,7 +562,9 @@ Fit transferred(const Problem& other, const Fit& from) {
     ci.prior = ci.low = ci.high = ci.start;
     x[i] = ci.start;
   }
-  return descend(other, Averaged(other), from.chosen, c, x, 30);
+  Fit out = descend(other, Averaged(other), from.chosen, c, x, 30);
+  out.uneven_per_A2 = from.uneven_per_A2;
+  return out;
 }
 
 Physical physical(const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
@@ -566,7 +575,9 @@ double parameter_value(const Problem& problem, const Cause& cause, int p, double
 }
 
 Model<double> model_of(const Problem& problem, const Fit& f, int log) {
-  return build<double>(problem, f.chosen, f.x.data(), log);
+  auto model = build<double>(problem, f.chosen, f.x.data(), log);
+  model.uneven_per_A2 = f.uneven_per_A2;
+  return model;
 }
 
 Replayed replayed(const Problem& problem, const Fit& f, int l) {

@@ -23,6 +23,7 @@ struct Fit {
   Eigen::MatrixXd from_data;    // of the data alone
   double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
   double misfit = 1e300;        // the same without prior
+  double uneven_per_A2 = 0;     // what its residuals show of Leeway::uneven_per_A2; a replay has it
   double narrowing = 0;         // twice the logarithm of the prior's volume over the posterior's (Laplace)
   int readings = 0;             // whitened residuals that entered
   int iterations = 0;

@@ -24,7 +24,8 @@ struct Model {
   S stall_share = S(0);       // extra share of copper heat while the rotor stands
   S cooling_factor = S(1);    // of the sink conductance, from cooling_from_s on
   S cooling_from_s = S(0);
-  S sensor_share = S(0);  // the housing sensor reads housing + share * (winding - housing)
+  double uneven_per_A2 = 0;  // times i^4 of a standing rotor: what its uneven phases heat more than the inputs have
+  S sensor_share = S(0);     // the housing sensor reads housing + share * (winding - housing)
   bool offset = false, delayed = false, drifts = false, stalls = false, cooling_changes = false, feels_winding = false;
 };
 

@@ -39,6 +39,7 @@ struct Noise {
 /// and bin. A fit averages over it (prior standard deviation 1 in that unit).
 struct Leeway {
   std::vector<std::vector<double>> housing_K, core_K;
+  double uneven_per_A2 = 0;  // of uneven phases: that ordinary size, on top of Problem::uneven_per_A2
 };
 
 struct Problem {

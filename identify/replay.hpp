@@ -89,6 +89,7 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
   if (model.offset)
     in[Drive::current_A2] +=
         model.current_offset_A * (2 * bin.signed_A) + model.current_offset_A * model.current_offset_A;
+  if (model.uneven_per_A2 != 0) in[Drive::current_A2] += model.uneven_per_A2 * bin.uneven_A4;
   const double a2 = bin.input[Drive::current_A2];
   if (model.stalls && a2 > 0) in[Drive::current_A2] *= model.stall_share * (bin.stalled_A2 / a2) + 1.0;
   if (model.drifts) {
@@ -110,7 +111,8 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
                          const S& housing_degC, Visit&& visit) {
   using Vector = typename thermal::HeatNetwork<S, n>::Vector;
   const auto& set = model.set;
-  const bool corrected = model.offset || model.delayed || model.drifts || model.stalls || model.cooling_changes;
+  const bool corrected = model.offset || model.delayed || model.drifts || model.stalls || model.cooling_changes ||
+                         model.uneven_per_A2 != 0;
   thermal::HeatInput<S> in;
   Vector T = Vector::Constant(housing_degC), next;
   T[model.core] = core_degC;
