@@ -15,6 +15,8 @@ constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
 /// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
 /// deviation.
 const double ordinary_uneven_share = 1 / std::sqrt(3.0);
+/// A frame on the housing, of its capacity, and behind so much of its resistance to the sink.
+constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
 struct Coordinate {
@@ -142,7 +144,7 @@ struct Whitener {
 /// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
 /// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
 struct Averaged {
-  static constexpr std::size_t most = 2;
+  static constexpr std::size_t most = 3;
   std::vector<Leeway> effects;  // whitened
   Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
   double log_determinant = 0;
@@ -511,9 +513,17 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resis
   late.chosen = {{cause_named("sensor_lag"), -1}};
   late.x.resize(two_resistors.x.size() + 1);
   late.x << two_resistors.x.head(base_count), tried_s, two_resistors.x.tail(two_resistors.x.size() - base_count);
+  Fit framed = two_resistors;
+  framed.chosen = {{cause_named("third_mass"), -1}};
+  framed.x.resize(two_resistors.x.size() + 2);
+  framed.x << two_resistors.x.head(base_count),
+      std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
+      std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W),
+      two_resistors.x.tail(two_resistors.x.size() - base_count);
+  framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
   Problem uneven = problem;
   uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
-  Leeway lateness, phases;
+  Leeway lateness, frame, phases;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   const auto off_K = [](std::vector<double> moved, const std::vector<double>& plain, double times) {
     for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
@@ -521,14 +531,16 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resis
   };
   for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
-                   warmed = replayed(uneven, two_resistors, l);
+                   held = replayed(problem, framed, l), warmed = replayed(uneven, two_resistors, l);
     lateness.housing_K.push_back(off_K(lagged.housing_degC, plain.housing_degC, late_s / tried_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
+    frame.housing_K.push_back(off_K(held.housing_degC, plain.housing_degC, 1));
+    frame.core_K.push_back(off_K(held.core_degC, plain.core_degC, 1));
     phases.housing_K.push_back(off_K(warmed.housing_degC, plain.housing_degC, 1));
     phases.core_K.push_back(off_K(warmed.core_degC, plain.core_degC, 1));
   }
-  if (!(problem.uneven_per_A2 > 0)) return {lateness};
-  return {lateness, phases};
+  if (!(problem.uneven_per_A2 > 0)) return {lateness, frame};
+  return {lateness, frame, phases};
 }
 
 double cost_of_noise(const Problem& problem) {

@@ -447,7 +447,7 @@ bool ends_without_a_name(const Problem& problem, const Field& field, const Distu
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
   const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
   const bool disturbed = noticeable(without_causes, margins);
-  if (gain > margins.detect && (moves >= margins.noticeable_K || disturbed)) return false;
+  if (gain > margins.detect && (moves >= margins.worth_K || disturbed)) return false;
   out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
   out.steps.push_back(
       gain > margins.detect
@@ -583,7 +583,7 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
 /// A board runs the model alone, for long and on other loads: what is handed on is fitted without leeway for lateness,
 /// to the noise that was judged by and no closer than such a model can be right.
 void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
-  judged.leeway.erase(judged.leeway.begin());
+  judged.leeway.erase(judged.leeway.begin(), judged.leeway.begin() + 2);
   // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
   const auto refit = [&](Fit& f) {
     const Problem less = believed_less(judged, f.chosen, 1);

@@ -37,7 +37,9 @@ struct Margins {
   double small_part_unseen = 0.3;
   /// Sets that differ by less than this times what the best leaves are near it: a winding wanders twice as much.
   double left_apart = 2;
-  /// What a cause must move, rms, in the winding or at the sensor, to be worth a name: thrice a thermistor's wander.
+  /// What a cause must move, rms, in the winding or at the sensor, to be worth a name: a thermistor's wander.
+  double worth_K = 0.05;
+  /// The same of a second cause, and of a slow disturbance to be more than sensors': thrice that.
   double noticeable_K = 0.15;
 };
 

@@ -110,6 +110,13 @@ const std::vector<Row>& rows() {
        Core::sparse,
        25,
        {{"alarms", alarm, false, 0.01, 0.05}}},
+      {"clean-dense",
+       "nothing hidden, designed profile, winding read all the time",
+       nothing,
+       Duty::designed,
+       Core::dense,
+       5,
+       {{"alarms", alarm, false, 0.01, 0.05}}},
       {"outside-duty",
        "effects that the table does not know, robot duty",
        outside,
@@ -369,7 +376,8 @@ int main(int argc, char** argv) {
   app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();
   app.add_option("--second", a.margins.second, "for a second one")->capture_default_str();
   app.add_option("--tie", a.margins.tie, "lead asked for a name")->capture_default_str();
-  app.add_option("--noticeable", a.margins.noticeable_K, "K that a cause must move")->capture_default_str();
+  app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")->capture_default_str();
+  app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")->capture_default_str();
   app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
   app.add_flag("--check", a.check, "end with an error below the floors");
   app.add_flag("--verbose", a.verbose, "one line a log");
