@@ -83,7 +83,7 @@ thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
 thermal::Trust trust_of(const Problem& problem, const Fit& f, const thermal::Trust& least) {
   const Eigen::MatrixXd doubt = doubts(f);
   const auto unit = [&](int coordinate) -> Eigen::VectorXd { return Eigen::VectorXd::Unit(f.x.size(), coordinate); };
-  // Slopes of logarithms: heat against capacity goes as 1/C1, what flows on against capacity as 1/(R1 C1).
+  // Slopes of logarithms: heat against capacity goes as 1/C1.
   int capacity = 2, resistance = 0;
   if (const int at = coordinate_of(f, Edit::hot_spot); at >= 0) capacity = at, resistance = at + 1;  // the hottest node
   Eigen::VectorXd power = -unit(capacity);
@@ -92,16 +92,16 @@ thermal::Trust trust_of(const Problem& problem, const Fit& f, const thermal::Tru
     power += unit(at) * most_K / (1 + f.x[at] * most_K);
   }
   const auto together = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return a.dot(doubt * b); };
-  // The board takes the errors of heat and of what flows on for independent. Where they go together that overstates
-  // both, and the smaller of R1's and the time constant's is still on the safe side.
-  const Eigen::VectorXd flow = -unit(capacity) - unit(resistance);
-  double inner = together(unit(resistance), unit(resistance));
-  if (together(power, flow) >= 0) inner = std::min(inner, together(flow, flow));
   const auto share = [](double variance, float at_least) {
     return std::clamp(static_cast<float>(std::sqrt(std::max(0.0, variance))), at_least, 0.5f);
   };
-  return {share(together(power, power), least.power), share(inner, least.inner_resistance),
-          share(together(unit(1), unit(1)), least.cooling)};
+  thermal::Trust trust = {share(together(power, power), least.power),
+                          share(together(unit(resistance), unit(resistance)), least.inner_resistance),
+                          share(together(unit(1), unit(1)), least.cooling)};
+  // More power is less capacity.
+  trust.correlation = static_cast<float>(std::clamp(
+      -together(power, unit(resistance)) / static_cast<double>(trust.power * trust.inner_resistance), -1.0, 1.0));
+  return trust;
 }
 
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence,
@@ -139,8 +139,8 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   }
   s += fmt::format("\n[housing_sensor]\nnode = {}\nlag_s = {:.6g}\noffset_K = {:.6g}\ngain_error = {:.6g}\n",
                    int{set.housing.node}, set.housing.lag_s, set.housing.offset_K, set.housing.gain_error);
-  s += fmt::format("\n[trust]\npower = {:.3f}\ninner_resistance = {:.3f}\ncooling = {:.3f}\n", trust.power,
-                   trust.inner_resistance, trust.cooling);
+  s += fmt::format("\n[trust]\npower = {:.3f}\ninner_resistance = {:.3f}\ncooling = {:.3f}\ncorrelation = {:.3f}\n",
+                   trust.power, trust.inner_resistance, trust.cooling, trust.correlation);
   std::string recording;
   if (m.offset) recording += fmt::format("current_offset_A = {:.6g}\n", m.current_offset_A);
   if (m.delayed) recording += fmt::format("delay_s = {:.6g}\n", m.delay_s);

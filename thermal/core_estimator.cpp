@@ -95,6 +95,8 @@ void CoreEstimator::widen_all() {
   p_(sensor(), sensor()) = squared(start_sigma_K);
   const float trust[3] = {settings_.trust.power, settings_.trust.inner_resistance, settings_.trust.cooling};
   for (int i = 0; i < 3; ++i) p_(n_ + 2 + i, n_ + 2 + i) = squared(trust[i]);
+  // The states are power over capacity and conductance: both signs turned.
+  p_(n_ + 2, n_ + 3) = p_(n_ + 3, n_ + 2) = settings_.trust.correlation * trust[0] * trust[1];
 }
 
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
@@ -162,7 +164,12 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   f.topLeftCorner(n_, n_) = nodes;
   const auto column = [&](int index, const Vec& rate) { f.col(index).head(n_) = phi1.lazyProduct(rate); };
   column(ambient(), network_.boundary_gain_per_s(Boundary::ambient).cast<float>());
-  column(n_ + 2, rates.sources.cast<float>());
+  // A winding whose capacity is off warms and cools at another rate, and the housing gets no more for it.
+  Vec warming = (rates.sources + rates.inner + rates.outer).cast<float>();
+  for (int i = 0; i < n_; ++i) {
+    if (!std::isfinite(max_degC_[i])) warming[i] = 0.0f;
+  }
+  column(n_ + 2, warming);
   column(n_ + 3, rates.inner.cast<float>());
   column(n_ + 4, rates.outer.cast<float>());
   const float take = 1.0f / (1.0f + static_cast<float>(housing_.lag_s) / dt_f);
@@ -434,13 +441,14 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = 0.0f;
   widen_all();
-  const int power = n_ + 2;
+  const int power = n_ + 2, inner = n_ + 3;
   for (int i = 0; i < n_; ++i) {
     if (i == housing_.node) continue;
     for (int j = 0; j < n_; ++j) {
       if (j != housing_.node) p_(i, j) = sigma_K[i] * sigma_K[j];
     }
     p_(i, power) = p_(power, i) = sigma_K[i] * settings_.trust.power;
+    p_(i, inner) = p_(inner, i) = settings_.trust.correlation * sigma_K[i] * settings_.trust.inner_resistance;
   }
   p_(sensor(), sensor()) = p_(housing_.node, housing_.node);  // the sensor is as warm as what it sits on
   p_(sensor(), housing_.node) = p_(housing_.node, sensor()) = p_(housing_.node, housing_.node);

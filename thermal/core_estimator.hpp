@@ -25,9 +25,13 @@ struct Reading {
 
 /// Relative standard deviations of what the heat set claims.
 struct Trust {
-  float power;             // heat per A^2 against heat capacity: what a burst depends on
-  float inner_resistance;  // links between nodes (R1)
+  float power;             // heat per A^2 against heat capacity of a winding: what a burst depends on
+  float inner_resistance;  // links between nodes (R1): what a steady winding depends on
   float cooling;           // links to the world (R2)
+  /// Of the errors of capacity and inner resistance, -1..1. Their product is known best: too much of one goes with too
+  /// little of the other. A load that lasts as long as a winding takes to warm is then more uncertain than if the two
+  /// erred independently, and what it cools by afterwards less.
+  float correlation = -0.5f;
 };
 /// Catalogue values are good to 10..30 %. Identified: typical standard errors of a fit with core readings.
 inline constexpr Trust sheet_trust{0.20f, 0.20f, 0.20f};

@@ -116,13 +116,16 @@ HeatModel read_heat_model(const std::string& path) {
   HeatModel model{set, {}};
   if (const toml::table* trust = file["trust"].as_table()) {
     const std::string place = path + ": trust";
-    known_keys(place, *trust, {"power", "inner_resistance", "cooling"});
-    const auto share = [&](const char* key) {
-      const double value = number(place, *trust, key, required);
-      if (!(value >= 0 && value <= 1)) refuse(fmt::format("{}: {} = {} is no share from 0 to 1.", place, key, value));
+    known_keys(place, *trust, {"power", "inner_resistance", "cooling", "correlation"});
+    const auto within = [&](const char* key, double least, double otherwise) {
+      const double value = number(place, *trust, key, otherwise);
+      if (!(value >= least && value <= 1))
+        refuse(fmt::format("{}: {} = {} is not between {:g} and 1.", place, key, value, least));
       return static_cast<float>(value);
     };
-    model.trust = thermal::Trust{share("power"), share("inner_resistance"), share("cooling")};
+    const auto share = [&](const char* key) { return within(key, 0, required); };
+    model.trust = thermal::Trust{share("power"), share("inner_resistance"), share("cooling"),
+                                 within("correlation", -1, static_cast<double>(thermal::Trust{}.correlation))};
   }
   return model;
 }

@@ -334,9 +334,8 @@ TEST(ModelFile, TrustIsInWhatTheBoardsHeatDependsOn) {
   };
   EXPECT_NEAR(trust(0).power, 0.08f, 1e-5);
   EXPECT_NEAR(trust(0).inner_resistance, 0.08f, 1e-5);
-  EXPECT_NEAR(trust(-0.8).inner_resistance, 0.08 * std::sqrt(0.4), 1e-5) << "their product is known better than each";
-  EXPECT_NEAR(trust(0.8).inner_resistance, 0.08f, 1e-5);
-  EXPECT_EQ(trust(-0.99).inner_resistance, thermal::identified_trust.inner_resistance) << "as good as such a fit is";
+  EXPECT_NEAR(trust(-0.8).correlation, -0.8f, 1e-4) << "their product is known better than each";
+  EXPECT_NEAR(trust(0.3).correlation, 0.3f, 1e-4);
   EXPECT_NEAR(trust(0, true).power, 0.08f, 1e-5) << "what ended at a bound is not known for that";
   EXPECT_NEAR(trust(0, false, 200).power, 0.16f, 1e-5) << "and more than noise was left";
 }

@@ -170,6 +170,56 @@ TEST(Estimator, SigmaGrowsWithLoadAndCoversASheetThatIsWrong) {
   }
 }
 
+TEST(Estimator, SigmaOfErrorsThatGoTogetherIsTheSpreadOfSuchMotors) {
+  // R1 C1 is known to 3 %, each alone to 9 %: C1 too small and R1 too large, as a fit leaves them.
+  constexpr double tau_sd = 0.03, alone_sd = 0.09;
+  wire::Motor sheet = reference::ec16();
+  sheet.copper_coefficient_per_K = 0;
+  const double i2_A2 = 90 / sheet.R1_K_per_W / (1.5 * sheet.phase_resistance_ohm);
+  const double tau_s = sheet.R1_K_per_W * sheet.C1_J_per_K;
+  struct Stretch {
+    double taus, load;
+  };
+  const Stretch course[] = {{0.3, 1}, {0.7, 1}, {4, 1}, {1, 0}};  // a burst, on, steady, cooling
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  constexpr int motors = 400;
+  double square[std::size(course)] = {};
+  reference::TwoNodes exact{sheet};
+  for (int motor = 0; motor <= motors; ++motor) {
+    wire::Motor m = sheet;
+    if (motor > 0) {  // ln C1 = z, ln R1 = -z + what the product is off by
+      const double z = alone_sd * normal(random);
+      m.C1_J_per_K *= std::exp(z);
+      m.R1_K_per_W *= std::exp(-z + tau_sd * normal(random));
+    }
+    reference::TwoNodes plant{m};
+    exact.degC = {25, 25};
+    for (std::size_t k = 0; k < std::size(course); ++k) {
+      const auto steps = static_cast<int>(course[k].taus * tau_s / 0.01);
+      for (reference::TwoNodes* p : {&plant, &exact})
+        p->advance(0.01L * steps, steps, static_cast<reference::Real>(course[k].load * i2_A2), 25);
+      square[k] += std::pow(static_cast<double>(plant.degC[0] - exact.degC[0]), 2) / motors;
+    }
+  }
+  const auto sigmas_K = [&](thermal::Trust trust) {
+    Bench bench(sheet, with(trust), 25);
+    bench.run(60, 0);
+    std::vector<double> out;
+    for (const Stretch& s : course) {
+      bench.run(s.taus * tau_s, s.load * i2_A2);
+      out.push_back(static_cast<double>(bench.sigma_K()));
+    }
+    return out;
+  };
+  const auto c = static_cast<float>(alone_sd), r = static_cast<float>(std::hypot(alone_sd, tau_sd));
+  const auto together = sigmas_K({c, r, 0, -c / r}), independent = sigmas_K({c, r, 0, 0});
+  for (std::size_t k = 0; k < std::size(course); ++k)
+    EXPECT_NEAR(together[k] / std::sqrt(square[k]), 1, 0.12) << "of course[" << k << "], beside 0.04 of chance";
+  EXPECT_LT(independent[1], 0.8 * together[1]) << "or the correlation does nothing";
+  EXPECT_GT(independent[3], 1.3 * together[3]);
+}
+
 TEST(Estimator, CoolingThatDiffersFromTheSheetIsTakenUpOrReadsHotNeverCold) {
   for (double scale : {0.7, 1.3}) {
     wire::Motor real = reference::ec16();

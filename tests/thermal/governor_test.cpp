@@ -226,21 +226,25 @@ TEST(Governor, ALongPushUsesTheWindingAndSettlesOnTheHoldingCurrent) {
 TEST(Governor, ASheetsUncertaintyCostsCapacityButNeitherSlopeNorLimit) {
   struct Case {
     thermal::Trust trust;
-    double R1_scale, C1_scale, least_share;  // of the optimum impulse in 2 s, known parameters
+    double R1_scale, C1_scale, ohm_scale;  // of the motor, of its sheet
+    double least_share;                    // of the optimum impulse in 2 s, known parameters
   };
-  for (const Case& c : {Case{thermal::sheet_trust, 1, 1, 0.80}, Case{thermal::sheet_trust, 1.3, 1, 0},
-                        Case{thermal::sheet_trust, 1, 0.7, 0}, Case{thermal::identified_trust, 1, 1, 0.95}}) {
+  for (const Case& c : {Case{thermal::sheet_trust, 1, 1, 1, 0.80}, Case{thermal::sheet_trust, 1.3, 1, 1, 0},
+                        Case{thermal::sheet_trust, 1, 0.7, 1, 0}, Case{thermal::sheet_trust, 1, 1, 1.2, 0},
+                        Case{thermal::sheet_trust, 1.3, 0.8, 1, 0}, Case{thermal::identified_trust, 1, 1, 1, 0.95}}) {
     thermal::EstimatorSettings es;
     es.trust = c.trust;
     Loop loop(reference::ec16(), 20, 25, es);
     loop.plant.m.R1_K_per_W *= c.R1_scale;
     loop.plant.m.C1_J_per_K *= c.C1_scale;
+    loop.plant.m.phase_resistance_ohm *= c.ohm_scale;
     for (int i = 0; i < 200; ++i) loop.step(20, 0, true);
     const double share = loop.impulse_As / optimum_As(reference::ec16(), 20, 25, 2);
     std::printf(
-        "  power known to %.0f %%, R1 x %.1f, C1 x %.1f: %.1f %% of the optimum in 2 s, hottest %.1f degC, steepest "
+        "  power known to %.0f %%, R1 x %.1f, C1 x %.1f, ohm x %.1f: %.1f %% of the optimum in 2 s, hottest %.1f degC, "
+        "steepest "
         "%.2f A\n",
-        static_cast<double>(100 * c.trust.power), c.R1_scale, c.C1_scale, 100 * share, loop.hottest_degC,
+        static_cast<double>(100 * c.trust.power), c.R1_scale, c.C1_scale, c.ohm_scale, 100 * share, loop.hottest_degC,
         loop.steepest_A);
     EXPECT_GE(share, c.least_share);
     EXPECT_LE(loop.hottest_degC, 155.0 + (c.least_share > 0 ? 0.5 : 6.0));
