@@ -580,10 +580,25 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
   }
 }
 
-/// A board runs the model alone, for long and on other loads: what is handed on is fitted without leeway for lateness,
-/// to the noise that was judged by and no closer than such a model can be right.
+/// Too little for a name, and yet likelier than two resistors: a board must not take it for excluded.
+void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
+  std::vector<double> likelier(out.singles.size(), 0.0);
+  in_parallel(likelier.size(), [&](std::size_t i) {
+    const Fit& f = out.singles[i].fit;
+    if (!(out.singles[i].gain > 0)) return;
+    const Problem less = believed_less(judged, f.chosen, 1);
+    likelier[i] = fit(less, {}, {&out.base.fit}).surprise() - fit(less, f.chosen, {&f}).surprise();
+  });
+  const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
+  for (std::size_t i = 0; i < likelier.size(); ++i)
+    out.singles[i].tied = likelier[i] > std::max(margins.likelier, most - margins.tie);
+}
+
+/// A board runs the model alone, for long and on other loads: what is handed on is fitted without leeway for lateness
+/// and frame, to the noise that was judged by and no closer than such a model can be right.
 void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
-  judged.leeway.erase(judged.leeway.begin(), judged.leeway.begin() + 2);
+  if (out.verdict == Verdict::adequate) mark_likelier(judged, margins, out);
+  std::erase_if(judged.leeway, [](const Leeway& l) { return l.uneven_per_A2 == 0; });
   // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
   const auto refit = [&](Fit& f) {
     const Problem less = believed_less(judged, f.chosen, 1);
@@ -596,19 +611,9 @@ void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   for (Candidate& c : out.sets) {
     if (c.tied) refit(c.fit);
   }
-  if (out.verdict != Verdict::adequate) return;
-  // Too little for a name, and yet likelier than two resistors: a board must not take it for excluded.
-  std::vector<double> likelier(out.singles.size(), 0.0);
-  for (std::size_t i = 0; i < likelier.size(); ++i) {
-    Fit& f = out.singles[i].fit;
-    if (!(out.singles[i].gain > 0)) continue;
-    refit(f);
-    const Problem less = believed_less(judged, f.chosen, 1);
-    if (f.x.size() > 0) likelier[i] = fit(less, {}, {&out.base.fit}).surprise() - f.surprise();
+  for (Candidate& c : out.singles) {
+    if (c.tied) refit(c.fit);
   }
-  const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
-  for (std::size_t i = 0; i < likelier.size(); ++i)
-    out.singles[i].tied = likelier[i] > std::max(0.0, most - margins.tie);
 }
 
 }  // namespace
