@@ -15,7 +15,8 @@ constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
 /// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
 /// deviation.
 const double ordinary_uneven_share = 1 / std::sqrt(3.0);
-/// A frame on the housing, of its capacity, and behind so much of its resistance to the sink.
+/// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
+/// host-sim's default motor: a standard deviation is one of these more or less.
 constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 

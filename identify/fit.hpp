@@ -46,9 +46,9 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
-/// What no motor is without: a housing that is not one mass and a sensor that is not quite on it, so that its reading
-/// comes early or late by seconds; and, where the rotor stands under load, phases that share their heat better or worse
-/// than was assumed. Causes are to be ranked by more than that. The lateness comes first. `two_resistors`: the
+/// What no motor is without: a sensor that is not quite on the housing, so that its reading comes early or late by
+/// seconds; a frame that takes a share of the housing's capacity; and, where the rotor stands under load, phases that
+/// share their heat better or worse than was assumed. Causes are to be ranked by more than that. `two_resistors`: the
 /// baseline's fit.
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors);
 

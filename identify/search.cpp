@@ -295,8 +295,8 @@ void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& fi
 }
 
 /// A second cause may only have helped the first out of a poor valley: each alone starts again from where the best
-/// pairs ended, and a pair must beat that. True when one was so deep in it that pairs looked at from there mean little.
-bool start_singles_again(const Problem& problem, Field& field) {
+/// pairs ended, and a pair must beat that.
+void start_singles_again(const Problem& problem, Field& field) {
   struct Again {
     Candidate* alone;
     const Fit* both;
@@ -311,22 +311,16 @@ bool start_singles_again(const Problem& problem, Field& field) {
     }
   }
   in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
-  bool deep = false;
   for (Again& again : all) {
-    if (again.fit.x.size() == 0 || again.fit.cost >= again.alone->fit.cost) continue;
-    deep = deep || 2 * (again.alone->fit.cost - again.fit.cost) > look_errs;
-    *again.alone = candidate(field.base, std::move(again.fit));
+    if (again.fit.x.size() > 0 && again.fit.cost < again.alone->fit.cost)
+      *again.alone = candidate(field.base, std::move(again.fit));
   }
   sort(field.singles);
-  return deep;
 }
 
 void fit_pairs(const Problem& problem, Field& field) {
-  constexpr int rounds = 3;
-  for (int i = 0; i < rounds; ++i) {
-    field.pairs = pairs_of(problem, field.base, field.singles);
-    if (!start_singles_again(problem, field)) break;
-  }
+  field.pairs = pairs_of(problem, field.base, field.singles);
+  start_singles_again(problem, field);
 }
 
 /// What no model of a few nodes follows, as a share of the housing's rise, slow. A housing believed to the hundredths

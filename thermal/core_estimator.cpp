@@ -429,8 +429,8 @@ double CoreEstimator::hottest_limit_degC() const {
   return static_cast<double>(lowest);
 }
 
-/// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of the
-/// heat they get (the worst case: it will grow the same way), and for one that the housing does not show.
+/// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of how
+/// fast they warm (the worst case: the next burst adds to it), and for one that the housing does not show.
 void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   sensor_degC_ = degC_[housing_.node];
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
