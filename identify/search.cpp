@@ -164,29 +164,8 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
   }
 }
 
-/// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
-/// into a poor valley by what is missing.
-std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
-                                  const std::vector<Candidate>& before) {
-  std::vector<Fit> fits(all.size());
-  in_parallel(all.size(), [&](std::size_t i) {
-    const std::vector<Chosen> alone = {all[i]};
-    const auto known =
-        std::find_if(before.begin(), before.end(), [&](const Candidate& b) { return b.fit.chosen == alone; });
-    fits[i] = fit(problem, alone, {known == before.end() ? &base.fit : &known->fit});
-    Fit anew = fit(problem, alone);
-    if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
-  });
-  std::vector<Candidate> out;
-  for (Fit& f : fits) {
-    if (f.x.size() > 0) out.push_back(candidate(base, std::move(f)));
-  }
-  sort(out);
-  return out;
-}
-
-/// For looks at a long log: fewer, longer bins. What `best` simulates differs in them, of a winding above all, whose
-/// time constant may be shorter; the readings are moved by that, so that it leaves what it left before.
+/// For looks and starts at a long log: fewer, longer bins. What `best` simulates differs in them, of a winding above
+/// all, whose time constant may be shorter; the readings are moved by that, so that it leaves what it left before.
 Problem coarse(const Problem& problem, const Fit& best) {
   std::size_t bins = 0;
   for (const Bins& log : problem.logs) bins += log.bins.size();
@@ -223,6 +202,30 @@ Problem coarse(const Problem& problem, const Fit& best) {
       log.bins[k].core_degC += rough.core_degC[k] - simulated.bins[k].core_degC;
     }
   }
+  return out;
+}
+
+/// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
+/// into a poor valley by what is missing.
+std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
+                                  const std::vector<Candidate>& before) {
+  const Problem rough = coarse(problem, base.fit);
+  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  std::vector<Fit> fits(all.size());
+  in_parallel(all.size(), [&](std::size_t i) {
+    const std::vector<Chosen> alone = {all[i]};
+    const auto known =
+        std::find_if(before.begin(), before.end(), [&](const Candidate& b) { return b.fit.chosen == alone; });
+    fits[i] = fit(rough, alone, {known == before.end() ? &base.fit : &known->fit});
+    Fit anew = fit(rough, alone);
+    if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
+    if (fits[i].x.size() > 0 && shorter) fits[i] = fit(problem, alone, {&fits[i]});
+  });
+  std::vector<Candidate> out;
+  for (Fit& f : fits) {
+    if (f.x.size() > 0) out.push_back(candidate(base, std::move(f)));
+  }
+  sort(out);
   return out;
 }
 
