@@ -20,9 +20,9 @@ struct Margins {
   /// 5101 to 5112); radiation of a whole board (4109) gained 18.1 and 18.8, a board_heat (score, 771132) 18.8, and 157
   /// other effects rightly named 30 and more.
   double still = 15;
-  /// Of a cause that is too little for a name, in the same way, for a board not to take it for excluded. Of 25 boards
-  /// with nothing hidden (designed 5001 to 5013, duty 5101 to 5112) hot spots gained 0.4 at most; four that sparse
-  /// readings do not name (gain, seeds 504, 1810, 10083, 10094) 1.1 to 8.7.
+  /// Of a cause that is too little for a name, in the same way, for a board not to take it for excluded. Of 36 boards
+  /// with nothing hidden (those of `still`) one's hot spot gained more (5015); four that sparse readings do not name
+  /// (gain, seeds 504, 1810, 10083, 10094) gained 1.1 to 8.7.
   double likelier = 1;
   /// Of a slow disturbance beside a set of causes: above it the set is not complete. Rightly named causes gained less
   /// than 4 in 19 of 20 logs and 12.5 at most (157 logs, duty and designed, seeds 660, 661, 800, 801).

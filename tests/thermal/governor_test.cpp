@@ -242,8 +242,7 @@ TEST(Governor, ASheetsUncertaintyCostsCapacityButNeitherSlopeNorLimit) {
     const double share = loop.impulse_As / optimum_As(reference::ec16(), 20, 25, 2);
     std::printf(
         "  power known to %.0f %%, R1 x %.1f, C1 x %.1f, ohm x %.1f: %.1f %% of the optimum in 2 s, hottest %.1f degC, "
-        "steepest "
-        "%.2f A\n",
+        "steepest %.2f A\n",
         static_cast<double>(100 * c.trust.power), c.R1_scale, c.C1_scale, c.ohm_scale, 100 * share, loop.hottest_degC,
         loop.steepest_A);
     EXPECT_GE(share, c.least_share);
