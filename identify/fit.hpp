@@ -52,6 +52,10 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 /// baseline's fit.
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors);
 
+/// Heat that goes otherwise with load than the recorded current's square says, as current sensors and sampling have it.
+/// A housing known to hundredths of a kelvin would take it for copper that warms otherwise, and so for another R1.
+Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors);
+
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.
 double cost_of_noise(const Problem& problem);
