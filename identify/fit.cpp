@@ -18,9 +18,9 @@ const double ordinary_uneven_share = 1 / std::sqrt(3.0);
 /// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
 /// host-sim's default motor: a standard deviation is one of these more or less.
 constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
-/// Of the heat, at the load where it arises on the average: a standard deviation. A recording of host-sim says 1
-/// percent too much at two and a half times that load (record designed, seed and hide 2105, top speed, against the
-/// plant's joules).
+/// Of the heat, where the current squared is its mean over the heat: a standard deviation. Recorded at top speed, at
+/// 0.9, 1.3 and 1.9 of that, host-sim's current says 0.4, 0.9 and 1.0 percent more heat than the plant's joules
+/// (designed, hide and seed 2105).
 constexpr double ordinary_load_share = 0.005;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
@@ -409,7 +409,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   return out;
 }
 
-/// What moved readings, `times` of it.
+/// How far apart two simulations of one log are, `times` over.
 std::vector<double> apart_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
   for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
   return moved;
