@@ -592,11 +592,13 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
 }
 
 /// A board runs the model alone, for long and on other loads: what is handed on is fitted without leeway for lateness
-/// and frame, with some for load, to the noise that was judged by and no closer than such a model can be right.
+/// and frame, with some for load where R1 is not plain, to the noise that was judged by and no closer than such a model
+/// can be right.
 void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   if (out.verdict == Verdict::adequate) mark_likelier(judged, margins, out);
   std::erase_if(judged.leeway, [](const Leeway& l) { return l.uneven_per_A2 == 0; });
-  judged.leeway.push_back(leeway_of_load(judged, out.base.fit));
+  // A winding read all the time shows R1 itself; one read now and then is outvoted by the housing.
+  if (judged.noise.core_slow_K == 0) judged.leeway.push_back(leeway_of_load(judged, out.base.fit));
   // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
   const auto refit = [&](Fit& f) {
     const Problem less = believed_less(judged, f.chosen, 1);
