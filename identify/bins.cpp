@@ -21,6 +21,9 @@ constexpr double most_bins = 200000;
 /// Of the current with its ripple, rms: without it there is less, but for what two sensors differ by.
 constexpr double most_sampled_share = 1.1;
 
+/// Of a coarse sensor's step, what noise of the sensor moves the moment of it.
+constexpr double step_noise_share = 0.15;
+
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 
 /// Missing cells replaced by the line between their neighbours.
@@ -235,7 +238,8 @@ Bins bins_of(const Log& log, double finest_s) {
   out.notes = log.notes;
   out.has_housing = log.has(Role::housing);
   out.has_core = log.has(Role::core);
-  out.housing_noise_K = reading_noise(log.of(Role::housing));
+  out.housing_noise_K =
+      log.housing_step_K > 0 ? step_noise_share * log.housing_step_K : reading_noise(log.of(Role::housing));
   out.core_noise_K = reading_noise(log.of(Role::core));
 
   const auto& t = log.of(Role::time);

@@ -28,10 +28,10 @@ struct Coordinate {
   double start, prior, sd, low, high;
 };
 
-double first_reading(const Bins& log, double Bin::*reading, int most = 5) {
+double first_reading(const Bins& log, double Bin::*reading, int most, double within_s = 30) {
   double sum = 0;
   int n = 0;
-  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < 30; ++k) {
+  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < within_s; ++k) {
     if (!std::isnan(log.bins[k].*reading)) sum += log.bins[k].*reading, ++n;
   }
   return n > 0 ? sum / n : missing;
@@ -61,7 +61,10 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
     }
   }
   for (const Bins& log : problem.logs) {
-    const double housing = first_reading(log, &Bin::housing_degC), core = first_reading(log, &Bin::core_degC, 1);
+    const double core = first_reading(log, &Bin::core_degC, 1);
+    double housing = first_reading(log, &Bin::housing_degC, 5);
+    // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
+    if (std::isnan(housing)) housing = first_reading(log, &Bin::housing_degC, 1, log.duration_s());
     const double at = std::isnan(housing) ? core : housing;
     const double sink = log.bins.front().input.boundary_degC[0];
     const double known = std::isnan(at) ? sink : at;

@@ -52,6 +52,85 @@ void mask_frozen(Log& log, Role role) {
                   own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
 }
 
+/// Of each reading and those around it, within half a second and ten rows either way: noise that reaches over the next
+/// step now and then is no step.
+std::vector<double> medians_around(const std::vector<double>& v, double usual_s) {
+  const auto reach = static_cast<std::size_t>(std::clamp(0.5 / usual_s, 0.0, 10.0));
+  std::vector<double> out = v, near;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    near.clear();
+    for (std::size_t k = i - std::min(i, reach); k <= std::min(i + reach, v.size() - 1); ++k) {
+      if (!std::isnan(v[k])) near.push_back(v[k]);
+    }
+    std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
+    out[i] = near[near.size() / 2];
+  }
+  return out;
+}
+
+/// The step of a channel that knows no values in between; 0 where it has none.
+double step_of(const std::vector<double>& v) {
+  std::vector<double> changes;
+  double last = missing;
+  for (const double x : v) {
+    if (std::isnan(x)) continue;
+    if (!std::isnan(last) && x != last) changes.push_back(std::abs(x - last));
+    last = x;
+  }
+  if (changes.empty()) return 0;
+  const double least = *std::min_element(changes.begin(), changes.end());
+  const auto whole = [&](double change) { return std::abs(change / least - std::round(change / least)) < 0.01; };
+  return std::all_of(changes.begin(), changes.end(), whole) ? least : 0;
+}
+
+/// A sensor that tells whole degrees says where it is only as it steps: there the truth lies half way, and in between
+/// it may be anywhere. A flutter about one step is one reading, at its middle. Of steps that follow each other within a
+/// second the moments are not known well enough.
+void read_between_steps(Log& log, Role role) {
+  constexpr double coarse_K = 0.4;  // finer steps are lost in what a thermistor wanders by
+  constexpr double flutter_s = 2, hurry_s = 1, most_hurried = 0.1;
+  constexpr std::size_t least_steps = 10;
+  std::vector<double>& v = log.of(role);
+  const auto& t = log.of(Role::time);
+  const double step_K = step_of(v);
+  if (step_K < coarse_K || 2 * count_missing(v) > v.size()) return;
+
+  struct Step {
+    std::size_t first, last;
+    double degC;
+  };
+  std::vector<Step> steps;
+  const double usual_s = t.back() / static_cast<double>(t.size() - 1), apart_s = std::max(hurry_s, 2.5 * usual_s);
+  const std::vector<double> settled = medians_around(v, usual_s);
+  for (std::size_t i = 1; i < v.size(); ++i) {
+    const double moved_K = std::abs(settled[i] - settled[i - 1]);
+    if (!(moved_K > 0)) continue;
+    const double degC = (settled[i] + settled[i - 1]) / 2;
+    if (steps.empty() || steps.back().degC != degC || t[i] - t[steps.back().last] > flutter_s)
+      steps.push_back({i, i, degC});
+    steps.back().last = i;
+  }
+  std::vector<Step> unhurried;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    if ((k == 0 || t[steps[k].first] - t[steps[k - 1].last] >= apart_s) &&
+        (k + 1 == steps.size() || t[steps[k + 1].first] - t[steps[k].last] >= apart_s))
+      unhurried.push_back(steps[k]);
+  }
+  if (unhurried.size() < least_steps) return;
+  if (role == Role::housing) {
+    // It feels the winding, and that shows in its hurry: then all readings are used.
+    if (static_cast<double>(unhurried.size()) < (1 - most_hurried) * static_cast<double>(steps.size())) return;
+    log.housing_step_K = step_K;
+  }
+  std::fill(v.begin(), v.end(), missing);
+  for (const Step& step : unhurried) v[(step.first + step.last) / 2] = step.degC;
+  log.notes.push_back(fmt::format(
+      "{} moves in steps of {:g} K; used are the moments of {} of its {} steps, each as a reading half way (a sensor "
+      "that rounds down then shows half a step too little).",
+      own_name(role), step_K, unhurried.size(), steps.size()));
+}
+
 /// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
 void note_missing_input(Log& log) {
   std::vector<Role> input = {Role::power};
@@ -157,6 +236,8 @@ void mask(Log& log) {
   note_missing_input(log);
   note_missing_readings(log);
   note_gaps(log);
+  if (log.has(Role::housing)) read_between_steps(log, Role::housing);
+  if (log.has(Role::core)) read_between_steps(log, Role::core);
   if (!log.has(Role::housing) && !log.has(Role::core))
     throw UserError(Exit::unusable,
                     log.name + ": no temperature of the motor is left; record the housing or the winding.");

@@ -164,6 +164,32 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
   }
 }
 
+/// A meter that holds its reading and then catches up wanders faster and farther than rest shows. Too fast for what is
+/// wrong with a motor, that is the sensor's own where it is likelier than any slow disturbance. Says whether it is.
+bool sensor_sticks(Problem& problem, const Fit& best, double worth) {
+  const auto evidence = [&](const Problem& p) {
+    return -fit(p, best.chosen, {&best}).surprise() - 2 * cost_of_noise(p);
+  };
+  const double own = evidence(problem);
+  Problem sticking = problem;
+  double most = own;
+  Noise likeliest = problem.noise;
+  for (const double slow_s : {5.0, 10.0}) {
+    sticking.noise.slow_s = slow_s;
+    double before = own;
+    for (double factor = 1.25; factor < 100; factor *= 1.25) {
+      sticking.noise.housing_slow_K = factor * problem.noise.housing_slow_K;
+      const double reached = evidence(sticking);
+      if (reached > most) most = reached, likeliest = sticking.noise;
+      if (reached < before) break;
+      before = reached;
+    }
+  }
+  if (!(most > own + worth) || !(most > disturbance_of(problem, best).evidence + worth)) return false;
+  problem.noise = likeliest;
+  return true;
+}
+
 /// For looks and starts at a long log: fewer, longer bins. What `best` simulates differs in them, of a winding above
 /// all, whose time constant may be shorter; the readings are moved by that, so that it leaves what it left before.
 Problem coarse(const Problem& problem, const Fit& best) {
@@ -420,15 +446,24 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
   sort(sets);
 }
 
-/// Every cause alone, twice: the best of the first round shows how noisy the readings are, and with that all are fitted
-/// again.
-void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all, Field& field) {
+/// Every cause alone, more than once: the best of a round shows how noisy the readings are, and with that all are
+/// fitted again.
+void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all, const Margins& margins, Field& field,
+                                Search& out) {
   fit_alone(problem, all, field);
   if (field.singles.empty()) return;
-  const Fit& best = field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
+  const auto best = [&]() -> const Fit& {
+    return field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
+  };
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
-  refine_housing_noise(problem, best);
-  if (sparse_core) refine_core_noise(problem, best);
+  refine_housing_noise(problem, best());
+  if (sparse_core) refine_core_noise(problem, best());
+  fit_alone(problem, all, field);
+  const double at_rest_K = problem.noise.housing_slow_K;
+  if (!sensor_sticks(problem, best(), margins.remains)) return;
+  out.steps.push_back(
+      fmt::format("The housing's sensor sticks: it wanders by {:.2f} K within {:.0f} s, and by {:.2f} K at rest.",
+                  problem.noise.housing_slow_K, problem.noise.slow_s, at_rest_K));
   fit_alone(problem, all, field);
 }
 
@@ -649,7 +684,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Field field;
   const auto all = available(problem, without);
   problem.leeway = ordinary_leeway(problem, fit(problem, {}));
-  fit_alone_and_settle_noise(problem, all, field);
+  fit_alone_and_settle_noise(problem, all, margins, field, out);
   out.base = out.chosen = field.base;
   out.noise = problem.noise;
   out.singles = field.singles;

@@ -362,19 +362,23 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   csv << "time_s,current_A,speed_rad_per_s,housing_degC,ambient_degC,neighbour_housing_degC,frame_degC"
       << (o.core == Core::none ? "" : ",core_degC") << "\n";
   const double noise = o.noisy ? 1 : 0;
+  const auto in_steps = [](double degC, double step_K) { return step_K * std::round(degC / step_K); };
   double wander = 0.05 * d.gauss();
   const double keep = std::exp(-row_s / 20), direct = std::sqrt(3.0) / 2;
   std::string text;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     wander = keep * wander + std::sqrt(1 - keep * keep) * 0.05 * d.gauss();
     const double reading = t.sensed[i] + noise * (wander + 0.2 * d.gauss());
-    const double housing = o.noisy ? 0.1 * std::round(reading / 0.1) : reading;
+    const double housing = o.noisy ? in_steps(reading, o.step_K) : reading;
     const double amps = rows[i].current_A == 0 ? 0 : rows[i].current_A * (1 + noise * 0.01 * d.gauss());
     fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.1f},{:.2f},{:.2f},{:.2f}",
                    static_cast<double>(i) * row_s, amps * direct, rows[i].speed_rad_per_s, housing,
                    ambient + 0.05 * d.gauss(), neighbour[i] + 0.1 * d.gauss(), frame[i] + 0.1 * mount.gauss());
     if (o.core != Core::none) text += ',';
-    if (o.core == Core::dense) fmt::format_to(std::back_inserter(text), "{:.3f}", t.core[i] + noise * 0.2 * d.gauss());
+    if (o.core == Core::dense) {
+      const double core = t.core[i] + noise * 0.2 * d.gauss();
+      fmt::format_to(std::back_inserter(text), "{:.3f}", o.step_K > 0.1 ? in_steps(core, o.step_K) : core);
+    }
     if (o.core == Core::sparse && i % 300 == 0)
       fmt::format_to(std::back_inserter(text), "{:.3f}", t.core[i] + noise * 2 * d.gauss());
     text += '\n';

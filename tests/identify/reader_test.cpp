@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <random>
 
 #include "identify/log.hpp"
 #include "identify/masks.hpp"
@@ -237,6 +238,35 @@ TEST(Masks, ACoarseOrConstantChannelIsNotFrozen) {
   std::vector<double> coarse;
   for (int i = 0; i < 2000; ++i) coarse.push_back(20 + 0.5 * std::floor(10 * (1 - std::exp(-i / 300.0)) / 0.5));
   EXPECT_TRUE(identify::frozen_runs(coarse).empty());
+}
+TEST(Masks, ASensorOfWholeDegreesIsReadAsItSteps) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  const auto truth_degC = [](double t) { return 25 + 12 * std::sin(t / 60); };  // one degree in five seconds at most
+  const auto log_of = [&](double step_K, double noise_K, double hurry) {
+    std::string text = head;
+    for (int i = 0; i < 6000; ++i) {
+      const double told_degC = step_K * std::round((truth_degC(0.1 * i * hurry) + noise_K * normal(random)) / step_K);
+      text += std::to_string(0.1 * i) + ",1," + std::to_string(told_degC) + "\n";
+    }
+    return read(text)[0];
+  };
+  for (const double noise_K : {0.0, 0.05, 0.2, 0.4}) {
+    const Log log = log_of(1, noise_K, 1);
+    EXPECT_EQ(log.housing_step_K, 1);
+    double sum = 0, readings = 0;
+    for (std::size_t i = 0; i < 6000; ++i) {
+      const double degC = log.of(Role::housing)[i];
+      if (std::isnan(degC)) continue;
+      sum += std::pow(degC - truth_degC(log.of(Role::time)[i]), 2);
+      readings += 1;
+    }
+    EXPECT_GT(readings, 60);
+    EXPECT_LT(std::sqrt(sum / readings), 0.15) << noise_K << ": what is believed of such a reading";
+    says(log.notes.back(), "moves in steps of 1 K");
+  }
+  EXPECT_EQ(log_of(0.1, 0, 1).housing_step_K, 0) << "fine steps";
+  EXPECT_EQ(log_of(1, 0, 30).housing_step_K, 0) << "six degrees a second";
 }
 TEST(Masks, RowsMissingOneByOneAreCounted) {
   std::string text = head;

@@ -190,7 +190,7 @@ struct Arguments {
   std::string only, remove;
   int seeds = 20, at_most = 0;
   std::uint64_t first = tests::rotating_seed();
-  double structure = 0.1, strength = 1;
+  double structure = 0.1, strength = 1, step_K = 0.1;
   bool mostly_small = false, verbose = false, explain = false, json = false, check = false, quick = false;
   identify::Margins margins;
 };
@@ -208,6 +208,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       c.log.strength = row.hidden == Hidden::zero ? 0 : a.strength;
       c.log.mostly_small = a.mostly_small;
       c.log.structure = a.structure;
+      c.log.step_K = a.step_K;
       c.log.small_ones = row.hidden == Hidden::dominant;
       std::uint64_t mixed = 0;
       for (const char letter : tests::joined(effects)) mixed = mixed * 131 + static_cast<unsigned char>(letter);
@@ -371,6 +372,7 @@ int main(int argc, char** argv) {
   app.add_option("--remove", a.remove, "take a cause out of the table");
   app.add_option("--structure", a.structure, "how far the clean motor is from two nodes, 1 = host-sim's default")
       ->capture_default_str();
+  app.add_option("--step", a.step_K, "K, of what the sensors tell: 1 = whole degrees")->capture_default_str();
   app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")->capture_default_str();
   app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
   app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();

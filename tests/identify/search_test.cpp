@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <random>
 #include <sstream>
 
 #include "host-sim/plant/hidden_causes.hpp"
@@ -118,6 +119,36 @@ TEST(Search, ASensorThatIsQuieterThanAssumedIsNoDisturbance) {
   EXPECT_EQ(found.verdict, Verdict::explained);
   for (const std::string& step : found.steps)
     EXPECT_EQ(step.find("leaves a slow disturbance"), std::string::npos) << step;
+}
+
+TEST(Search, WholeDegreesAreEnoughForAName) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  for (const tests::Core core : {tests::Core::sparse, tests::Core::dense}) {
+    tests::HiddenLogOptions o{.duty = tests::Duty::designed, .core = core, .seed = 5, .step_K = 1};
+    EXPECT_EQ(identify::search(hidden(o).problem).verdict, Verdict::adequate);
+    for (const char* id : {"third_mass", "load_friction", "cooling_change"}) {
+      o.effects = {id};
+      expect_named(o, "unknown_cause, all readings between the steps believed");
+    }
+  }
+}
+
+TEST(Search, ASensorThatWandersWithinSecondsAsItWarmsHidesNoCause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  Hidden log = hidden({.duty = tests::Duty::designed, .seed = 5, .effects = {"third_mass"}});
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (identify::Bins& bins : log.problem.logs) {
+    const double keep = std::exp(-bins.width_s / 5);
+    double wander_K = 0;
+    for (identify::Bin& bin : bins.bins) {
+      wander_K = keep * wander_K + (bin.idle ? 0 : std::sqrt(1 - keep * keep) * 0.3 * normal(random));
+      bin.housing_degC += wander_K;
+    }
+  }
+  const auto found = identify::search(log.problem);
+  EXPECT_EQ(found.verdict, Verdict::explained) << "unknown_cause, as noisy as at rest";
+  EXPECT_EQ(found.tied.front(), std::vector<std::string>{"third_mass"});
 }
 
 TEST(Search, WithTheTrueCauseTakenOutOfTheTableItIsNotNamed) {
