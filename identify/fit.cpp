@@ -22,6 +22,8 @@ constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 
 /// 0.9, 1.3 and 1.9 of that, host-sim's current says 0.4, 0.9 and 1.0 percent more heat than the plant's joules
 /// (designed, hide and seed 2105).
 constexpr double ordinary_load_share = 0.005;
+/// In the middle of what catalogues have (maxon, of 5 to 200 W: R1 0.03..1.4 of R2, C1 0.02..0.6 of C2).
+constexpr double usual_R1_share = 0.2, usual_C1_share = 0.11;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
 struct Coordinate {
@@ -507,12 +509,19 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 
   // A few steps tell which valley is worth descending into.
   constexpr int look = 4;
-  const Cause& unknown = cause_of(chosen.back());
-  const auto starts = starts_of(unknown, c, static_cast<std::size_t>(last));
-  Fit best;
-  for (const auto& start : starts) {
+  std::vector<Eigen::VectorXd> starts;
+  for (const auto& start : starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last))) {
     for (std::size_t p = 0; p < start.size(); ++p) x[last + static_cast<Eigen::Index>(p)] = start[p];
-    Fit f = descend(problem, averaged, chosen, c, x, starts.size() > 1 ? std::min(look, most) : most);
+    starts.push_back(x);
+    if (warm.size() > 0 || problem.belief.known) continue;
+    // What two resistors alone are fitted best by may have no winding to speak of.
+    x.head(base_count) << x[1] + std::log(usual_R1_share), x[1], x[3] + std::log(usual_C1_share), x[3];
+    starts.push_back(x);
+    x.head(base_count) = starts.front().head(base_count);
+  }
+  Fit best;
+  for (const Eigen::VectorXd& start : starts) {
+    Fit f = descend(problem, averaged, chosen, c, start, starts.size() > 1 ? std::min(look, most) : most);
     if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
   }
   if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;

@@ -134,16 +134,12 @@ void rough_search(Problem& whole) {
       least = f.cost;
       best = b;
       // A housing that answers at once is fitted best by both masses as one, and no motor is so. In catalogues R1 is
-      // 0.03..1.4 of R2 and C1 0.02..0.6 of C2 (maxon, of 5 to 200 W); where three times as far does not do, two
-      // resistors say nothing of the winding, and the middle is as good a place to start.
+      // 0.03..1.4 of R2 and C1 0.02..0.6 of C2 (maxon, of 5 to 200 W); three times as far is allowed either way.
       const Physical p = physical(f.x);
-      const auto plausible = [](double share, double low, double high) {
-        return share < low / 3 || share > 3 * high ? std::sqrt(low * high) : share;
-      };
       best.R2_K_per_W = p.R2_K_per_W;
-      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K);
-      best.R1_K_per_W = plausible(p.R1_K_per_W / p.R2_K_per_W, 0.03, 1.4) * best.R2_K_per_W;
-      best.C1_J_per_K = plausible(std::min(p.C1_J_per_K, p.C2_J_per_K) / best.C2_J_per_K, 0.02, 0.6) * best.C2_J_per_K;
+      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / 1.8);
+      best.R1_K_per_W = std::clamp(p.R1_K_per_W, 0.01 * p.R2_K_per_W, 4.2 * p.R2_K_per_W);
+      best.C1_J_per_K = std::clamp(p.C1_J_per_K, 0.007 * best.C2_J_per_K, 1.8 * best.C2_J_per_K);
     }
   }
   if (least < 1e300) whole.belief = best;
