@@ -509,23 +509,23 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 
   // A few steps tell which valley is worth descending into.
   constexpr int look = 4;
-  std::vector<Eigen::VectorXd> starts;
-  for (const auto& start : starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last))) {
-    for (std::size_t p = 0; p < start.size(); ++p) x[last + static_cast<Eigen::Index>(p)] = start[p];
-    starts.push_back(x);
-    if (warm.size() > 0 || problem.belief.known) continue;
-    // What two resistors alone are fitted best by may have no winding to speak of.
-    x.head(base_count) << x[1] + std::log(usual_R1_share), x[1], x[3] + std::log(usual_C1_share), x[3];
-    starts.push_back(x);
-    x.head(base_count) = starts.front().head(base_count);
-  }
-  Fit best;
-  for (const Eigen::VectorXd& start : starts) {
-    Fit f = descend(problem, averaged, chosen, c, start, starts.size() > 1 ? std::min(look, most) : most);
-    if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
-  }
-  if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;
-  return descend(problem, averaged, chosen, c, best.x, most);
+  const auto starts = starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last));
+  const auto fitted_from = [&](Eigen::VectorXd from) {
+    Fit best;
+    for (const auto& start : starts) {
+      for (std::size_t p = 0; p < start.size(); ++p) from[last + static_cast<Eigen::Index>(p)] = start[p];
+      Fit f = descend(problem, averaged, chosen, c, from, starts.size() > 1 ? std::min(look, most) : most);
+      if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
+    }
+    if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;
+    return descend(problem, averaged, chosen, c, best.x, most);
+  };
+  Fit best = fitted_from(x);
+  if (warm.size() > 0 || problem.belief.known) return best;
+  // What two resistors alone are fitted best by may have no winding to speak of.
+  x.head(base_count) << x[1] + std::log(usual_R1_share), x[1], x[3] + std::log(usual_C1_share), x[3];
+  Fit usual = fitted_from(x);
+  return usual.cost < best.cost ? usual : best;
 }
 
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors) {

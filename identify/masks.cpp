@@ -90,7 +90,7 @@ double step_of(const std::vector<double>& v) {
 void read_between_steps(Log& log, Role role) {
   constexpr double coarse_K = 0.4;  // finer steps are lost in what a thermistor wanders by
   constexpr double flutter_s = 2, hurry_s = 1, most_hurried = 0.1;
-  constexpr std::size_t least_steps = 10;
+  constexpr std::size_t least_steps = 4;
   std::vector<double>& v = log.of(role);
   const auto& t = log.of(Role::time);
   const double step_K = step_of(v);
@@ -105,7 +105,7 @@ void read_between_steps(Log& log, Role role) {
   const std::vector<double> settled = medians_around(v, usual_s);
   for (std::size_t i = 1; i < v.size(); ++i) {
     const double moved_K = std::abs(settled[i] - settled[i - 1]);
-    if (!(moved_K > 0)) continue;
+    if (std::isnan(moved_K) || moved_K == 0) continue;
     const double degC = (settled[i] + settled[i - 1]) / 2;
     if (steps.empty() || steps.back().degC != degC || t[i] - t[steps.back().last] > flutter_s)
       steps.push_back({i, i, degC});

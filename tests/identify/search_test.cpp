@@ -229,6 +229,17 @@ TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass)
   EXPECT_GT(blind.belief.C1_J_per_K, 0.006 * blind.belief.C2_J_per_K);
 }
 
+TEST(Search, WithoutASheetCausesStartFromAUsualMotorAsWell) {
+  const Hidden log = hidden({.core = tests::Core::none, .seed = 18, .effects = {"sensor_placement"}});
+  Problem blind = identify::problem_of(log.logs, {});
+  const auto gained = [&] {
+    return identify::fit(blind, {}).cost - identify::fit(blind, {{identify::cause_named("sensor_placement"), -1}}).cost;
+  };
+  const double from_both = gained();
+  blind.belief.known = true;  // it is not: then where two resistors ended is the only start
+  EXPECT_GT(from_both, 100 * std::max(1.0, gained()));
+}
+
 TEST(Experiment, StaysWithinTheMotorsLimits) {
   const Hidden log = hidden({"radiation"}, 4242);
   identify::Search tie;
