@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Finds what a log claims but cannot have measured: frozen channels, holes, gaps in time. Masks it and says so.
+// Finds what a log claims but cannot have measured: frozen channels, readings between the steps of a coarse sensor,
+// holes, gaps in time. Masks it and says so.
 #pragma once
 
 #include "identify/log.hpp"
 
 namespace identify {
 
-/// Turns frozen readings into missing ones, sums up what is missing and lies in gaps, and notes each in log.notes.
+/// Turns frozen readings into missing ones, sums up what is missing and lies in gaps, leaves of a coarse sensor the
+/// moments of its steps, and notes each in log.notes.
 /// Throws UserError (unusable) when the heat input is missing in three rows of ten, or no temperature is left at all.
 void mask(Log& log);
 
