@@ -21,8 +21,9 @@ namespace {
 constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
-constexpr std::size_t least_look_bins = 6000;  // of twice as many, looks see every two as one
-constexpr double least_slow_K = 0.02;          // below it a thermistor's slow noise hides behind its steps
+constexpr std::size_t least_look_bins = 6000;    // of twice as many, looks see every two as one
+constexpr double least_slow_K = 0.02;            // below it a thermistor's slow noise hides behind its steps
+constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: the moment between two rows
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
 Candidate candidate(const Candidate& base, Fit f) {
@@ -148,20 +149,23 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   return out;
 }
 
-/// Rest shows the housing's slow noise, and with it what still flows inside the motor: never less than the noise. Where
-/// the best model's residual is likelier with less, less is taken; never more: the noise would swallow what is wrong.
+/// Rest shows the housing's slow noise, and with it what still flows inside the motor: never less than the noise. What
+/// is known of a coarse sensor's steps is known of the worst. Where the best model's residual is likelier with less,
+/// less is taken; never more: the noise would swallow what is wrong.
 void refine_housing_noise(Problem& problem, const Fit& best) {
-  const auto evidence = [&](const Problem& p) {
-    return -fit(p, best.chosen, {&best}).surprise() - 2 * cost_of_noise(p);
+  double most = -1e300;
+  const auto lessen = [&](double Noise::*which, double least_K) {
+    for (Problem less = problem; less.noise.*which > least_K; less.noise.*which *= 0.8) {
+      const double reached = -fit(less, best.chosen, {&best}).surprise() - 2 * cost_of_noise(less);
+      if (reached < most) return;
+      most = reached;
+      problem.noise.*which = less.noise.*which;
+    }
   };
-  Problem less = problem;
-  double most = evidence(problem);
-  for (less.noise.housing_slow_K *= 0.8; less.noise.housing_slow_K > least_slow_K; less.noise.housing_slow_K *= 0.8) {
-    const double reached = evidence(less);
-    if (reached < most) return;
-    most = reached;
-    problem.noise.housing_slow_K = less.noise.housing_slow_K;
-  }
+  double step_K = 0;
+  for (const Bins& log : problem.logs) step_K = std::max(step_K, log.housing_step_K);
+  if (step_K > 0) lessen(&Noise::housing_white_K, least_step_noise_share * step_K);
+  lessen(&Noise::housing_slow_K, least_slow_K);
 }
 
 /// A meter that holds its reading and then catches up wanders faster and farther than rest shows. Too fast for what is
