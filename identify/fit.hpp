@@ -41,8 +41,8 @@ struct Fit {
 
 /// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause
 /// starts from its parameters in the first of them that has it. A last cause that none has starts near nothing, and,
-/// where it is nonlinear in its parameters, from several places. `most`: Newton steps; few are a look at what the
-/// causes promise.
+/// where it is nonlinear in its parameters, from several places; without warm and motor file from a usual motor, too.
+/// `most`: Newton steps; few are a look at what the causes promise.
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 

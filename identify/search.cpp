@@ -116,8 +116,10 @@ struct Disturbance {
   double evidence = 0;  // of the set with it; to compare sets that leave different disturbances
 };
 
+/// Of a fit to the problem's noise; to compare fits that assume different noise.
+double evidence(const Problem& problem, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(problem); }
+
 Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
-  const auto evidence = [](const Problem& p, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(p); };
   const double own = evidence(problem, undisturbed);
   // One to four minutes: slower ones are the model's own time constants, faster ones the sensor's wander. Half as large
   // again each time: coarser than that loses a gain of three.
@@ -156,7 +158,7 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
   double most = -1e300;
   const auto lessen = [&](double Noise::*which, double least_K) {
     for (Problem less = problem; less.noise.*which > least_K; less.noise.*which *= 0.8) {
-      const double reached = -fit(less, best.chosen, {&best}).surprise() - 2 * cost_of_noise(less);
+      const double reached = evidence(less, fit(less, best.chosen, {&best}));
       if (reached < most) return;
       most = reached;
       problem.noise.*which = less.noise.*which;
@@ -169,12 +171,9 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
 }
 
 /// A meter that holds its reading and then catches up wanders faster and farther than rest shows. Too fast for what is
-/// wrong with a motor, that is the sensor's own where it is likelier than any slow disturbance. Says whether it is.
-bool sensor_sticks(Problem& problem, const Fit& best, double worth) {
-  const auto evidence = [&](const Problem& p) {
-    return -fit(p, best.chosen, {&best}).surprise() - 2 * cost_of_noise(p);
-  };
-  const double own = evidence(problem);
+/// wrong with a motor, that is taken for its noise where it is likelier than any slow disturbance. Says whether it was.
+bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {
+  const double own = evidence(problem, fit(problem, best.chosen, {&best}));
   Problem sticking = problem;
   double most = own;
   Noise likeliest = problem.noise;
@@ -183,7 +182,7 @@ bool sensor_sticks(Problem& problem, const Fit& best, double worth) {
     double before = own;
     for (double factor = 1.25; factor < 100; factor *= 1.25) {
       sticking.noise.housing_slow_K = factor * problem.noise.housing_slow_K;
-      const double reached = evidence(sticking);
+      const double reached = evidence(sticking, fit(sticking, best.chosen, {&best}));
       if (reached > most) most = reached, likeliest = sticking.noise;
       if (reached < before) break;
       before = reached;
@@ -464,7 +463,7 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
   if (sparse_core) refine_core_noise(problem, best());
   fit_alone(problem, all, field);
   const double at_rest_K = problem.noise.housing_slow_K;
-  if (!sensor_sticks(problem, best(), margins.remains)) return;
+  if (!take_sticking_for_noise(problem, best(), margins.remains)) return;
   out.steps.push_back(
       fmt::format("The housing's sensor sticks: it wanders by {:.2f} K within {:.0f} s, and by {:.2f} K at rest.",
                   problem.noise.housing_slow_K, problem.noise.slow_s, at_rest_K));

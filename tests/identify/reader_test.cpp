@@ -263,6 +263,7 @@ TEST(Masks, ASensorOfWholeDegreesIsReadAsItSteps) {
     }
     EXPECT_GT(readings, 60);
     EXPECT_LT(std::sqrt(sum / readings), 0.15) << noise_K << ": what is believed of such a reading";
+    ASSERT_FALSE(log.notes.empty());
     says(log.notes.back(), "moves in steps of 1 K");
   }
   EXPECT_EQ(log_of(0.1, 0, 1).housing_step_K, 0) << "fine steps";

@@ -128,7 +128,7 @@ TEST(Search, WholeDegreesAreEnoughForAName) {
     EXPECT_EQ(identify::search(hidden(o).problem).verdict, Verdict::adequate);
     for (const char* id : {"third_mass", "load_friction", "cooling_change"}) {
       o.effects = {id};
-      expect_named(o, "unknown_cause, all readings between the steps believed");
+      expect_named(o, "some unknown, some only in part, with all readings between the steps believed");
     }
   }
 }
