@@ -42,7 +42,7 @@ void Recorder::finish() {
 std::vector<Target> usual_signals(const Dictionary& signals, int axis) {
   std::vector<Target> found;
   for (const char* name :
-       {"id_A", "iq_A", "speed_rad_per_s", "bus_V", "housing_measured_degC", "ambient_degC", "board_degC",
+       {"current_A", "id_A", "iq_A", "speed_rad_per_s", "bus_V", "housing_measured_degC", "ambient_degC", "board_degC",
         "core_a_degC", "core_b_degC", "core_c_degC", "housing_degC", "allowance_A", "mode", "limit"}) {
     for (const Target& signal : signals.all()) {
       const bool mine = signal.axis == axis || signal.axis == wire::no_axis;

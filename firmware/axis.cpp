@@ -5,6 +5,7 @@
 #include <limits>
 #include <new>
 
+#include "thermal/indices.hpp"
 #include "thermal/losses.hpp"
 #include "thermal/validate.hpp"
 
@@ -74,6 +75,7 @@ void Axis::restore(const AxisMemory& memory) {
 /// A board or a heat set that cannot be is refused with id 0; a heat set without nodes is one that was never given.
 void Axis::judge(const AxisSetup& setup) {
   next_ = setup.parameters;
+  copper_per_K_ = setup.heat.source_count > 0 ? static_cast<float>(setup.heat.sources[0].coefficient_per_K) : 0.0f;
   finding_ = validate(setup.parameters, rating_);
   const bool no_heat = setup.heat.node_count == 0;
   const bool cannot_be = !plausible(rating_) || !(no_heat || usable(setup.heat));
@@ -105,6 +107,8 @@ void Axis::take_over() {
   A_per_Nm_ = 1.0f / (1.5f * p.pole_pairs_count * p.flux_linkage_Wb);
   offset_bound_A_ = p.offset_bound_A;
   inductance_H_ = 0.5f * (p.inductance_d_H + p.inductance_q_H);
+  phase_ohm_ = p.phase_resistance_ohm;
+  flux_Wb_ = p.flux_linkage_Wb;
   pwm_Hz_ = rating_.pwm_Hz;
   period_s_ = 1.0f / rating_.pwm_Hz;
   if (fault_.fault == wire::Fault::parameters) {
@@ -125,7 +129,7 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample));
   HeatSums& sums = heat_.adding();
   add_heat(sums, phase_A, sight.periods);
-  trace_.note_sample(phase_A, sample.rotor_rad);
+  trace_.note_sample(phase_A, sample.rotor_rad, last_.ratio);
 
   setpoint_.follow(sight.periods);
   if (mode_ != Mode::running || !(setpoint_.share() > 0.0f)) return resting(sample, current_A, sight.periods);
@@ -293,6 +297,17 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   publish();
 }
 
+/// Squared current that the samples of the last step did not show, from the last of them. The winding is taken as warm
+/// as the hottest phase is believed to be.
+float Axis::unseen_A2() const {
+  const float warm_K = static_cast<float>(core_.estimate().hottest_degC()) - 25.0f;
+  const float phase_ohm = phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
+  const float turn_rad = rotor_.electrical_rad_per_s() * period_s_;
+  return thermal::unseen_A2(trace_.ended, trace_.phase_A,
+                            {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s}) +
+         thermal::turning_A2(trace_.current_A.d, trace_.current_A.q, flux_Wb_, turn_rad, inductance_H_);
+}
+
 /// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
 /// on before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
@@ -302,12 +317,13 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
   } else {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
-    // Ripple that sampling in the zero vector cannot see, from the last duty; half of its square in each phase.
-    const float ripple_A2 = enabled * thermal::ripple_A2(last_.ratio, trace_.bus_V, inductance_H_, pwm_Hz_);
+    const float more_A2 = mode_ == Mode::running ? unseen_A2() : 0.0f;
     const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
     double sampled_A2 = 0.0, vector_A2 = 0.0;
     for (int k = 0; k < 3; ++k) {
-      const double one_A2 = static_cast<double>(phase_A2[k] + 0.5f * ripple_A2);
+      const float phase = phase_A2[k] + 0.5f * more_A2;
+      const double one_A2 =
+          static_cast<double>(phase < 0.0f ? 0.0f : phase);  // NaN stays, and is replaced by something hot
       input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;
       sampled_A2 += static_cast<double>(phase_A2[k]) / 1.5;
       vector_A2 += one_A2 / 1.5;
@@ -366,6 +382,7 @@ void Axis::publish() {
   }
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];
   state.housing_degC = static_cast<float>(now.housing_degC);
+  state.heating_A = static_cast<float>(thermal::direct_A(std::sqrt(input_[thermal::Drive::current_A2])));
   state.allowance_A = allowance_.current_A;
   state.limit = state.fast.limit;
   state.estimate_flags = now.flags;

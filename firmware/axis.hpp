@@ -70,6 +70,7 @@ struct AxisState {
   float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
   float core_sigma_K = 0.0f;              // of the hottest
   float housing_degC = 0.0f;              // estimated
+  float heating_A = 0.0f;                 // direct, through two terminals: heats as the phases did, ripple included
   float allowance_A = 0.0f;               // amplitude, the smallest of core, board and what blindness leaves
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
   std::uint32_t estimate_flags = 0;       // thermal::EstimateFlag
@@ -174,6 +175,7 @@ class Axis {
   void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
   thermal::HeatInput<> heat_input(const HeatSums& sums) const;
+  float unseen_A2() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
   void change(Event event) { mode_ = next(mode_, event); }
@@ -205,11 +207,14 @@ class Axis {
     Dq current_A{}, permitted_A{}, asked_V{};
     Abc phase_A{};
     float share = 1.0f, bus_V = 0.0f, rotor_rad = 0.0f;
+    Abc ended{0.5f, 0.5f, 0.5f}, loaded{0.5f, 0.5f, 0.5f};  // ratios of the period that the sample ends, and begins
     wire::Limit limit = wire::Limit::none;
 
-    void note_sample(const Abc& phase, float rotor) {
+    void note_sample(const Abc& phase, float rotor, const Abc& loading) {
       phase_A.a = phase.a, phase_A.b = phase.b, phase_A.c = phase.c;
       rotor_rad = rotor;
+      ended.a = loaded.a, ended.b = loaded.b, ended.c = loaded.c;
+      loaded.a = loading.a, loaded.b = loading.b, loaded.c = loading.c;
     }
     void note(Dq current, Dq permitted, Dq asked, float given, float bus, wire::Limit why) {
       // By component: the compiler copies a whole Dq by way of the stack.
@@ -231,7 +236,7 @@ class Axis {
   thermal::CoreEstimator core_;
   thermal::Governor governor_;
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
-  float inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
+  float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;

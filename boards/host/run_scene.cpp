@@ -14,7 +14,6 @@
 #include "boards/host/optimum.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
-#include "thermal/losses.hpp"
 #include "thermal/motor_set.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
@@ -68,12 +67,12 @@ class Wish {
 /// Means over one log interval.
 class Sums {
  public:
-  explicit Sums(double inductance_H, float pwm_Hz) : inductance_H_(static_cast<float>(inductance_H)), pwm_Hz_(pwm_Hz) {}
-
-  void add(const firmware::FastView& fast, const host_sim::AxisTruth& truth) {
-    square_A2_ += static_cast<double>(thermal::ripple_A2(fast.ratio, fast.bus_V, inductance_H_, pwm_Hz_));
-    torque_current_A_ += static_cast<double>(fast.current_A.q);
+  /// `heat`: as the slow lane last believed it, with what samples do not show.
+  void add(const firmware::FastView& fast, const thermal::HeatInput<>& heat, const host_sim::AxisTruth& truth) {
+    const double sampled_A = heat[thermal::Drive::current_A];
+    square_A2_ += heat[thermal::Drive::current_A2] - sampled_A * sampled_A;
     square_A2_ += static_cast<double>(fast.current_A.d * fast.current_A.d + fast.current_A.q * fast.current_A.q);
+    torque_current_A_ += static_cast<double>(fast.current_A.q);
     speed_ += static_cast<double>(fast.rad_per_s);
     bus_V_ += static_cast<double>(fast.bus_V);
     torque_Nm_ += truth.torque_Nm;
@@ -83,18 +82,17 @@ class Sums {
   void write(Row& row) {
     const double n = std::max(count_, 1);
     row.iq_A = torque_current_A_ / n;
-    row.current_A = std::copysign(root_3_over_2 * std::sqrt(square_A2_ / n), torque_current_A_);
+    row.current_A = std::copysign(root_3_over_2 * std::sqrt(std::max(0.0, square_A2_ / n)), torque_current_A_);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
     row.shaft_W = shaft_W_ / n;
-    *this = Sums(static_cast<double>(inductance_H_), pwm_Hz_);
+    *this = {};
   }
 
  private:
   double torque_current_A_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
   int count_ = 0;
-  float inductance_H_, pwm_Hz_;
 };
 
 host_sim::Load load_of(const Shaft& shaft) {
@@ -278,7 +276,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
 
   std::vector<Trace> traces;
   std::vector<Wish> wishes;
-  std::vector<Sums> sums(2, Sums(file_.motor.inductance_d_H, rating_of(scene_.board).pwm_Hz));
+  std::vector<Sums> sums(2);
   for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis) {
     traces.push_back({limiter_, axis, {}});
     wishes.emplace_back(scene_, limiter_, file_);
@@ -297,7 +295,8 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
       Trace& trace = traces[i];
       const host_sim::AxisTruth truth = bench_.truth(trace.axis);
       const double demand = demand_A(scene_, trace.axis, time_s);
-      sums[i].add(driver_.axis(trace.axis).fast(), truth);
+      const firmware::Axis& axis = driver_.axis(trace.axis);
+      sums[i].add(axis.fast(), axis.core().input(), truth);
       trace.hottest_true_degC = std::max(trace.hottest_true_degC, truth.hottest_degC);
       trace.peak_shaft_W = std::max(trace.peak_shaft_W, truth.shaft_W);
       if (demand != 0) trace.impulse_As += std::hypot(truth.current_d_A, truth.current_q_A) * period_s;

@@ -200,7 +200,7 @@ void Bench::sense_axis(int index, double now_s) {
   const SensorDesign& s = design_.sensors;
   Axis& axis = axes_[index];
   AxisRaw& raw = raw_[index];
-  std::array<double, 3> current_A = axis.motor.current_A();
+  std::array<double, 3> current_A = axis.bridge.sampled_A(axis.motor);
   if (axis.bridge.short_from >= 0) {
     current_A[axis.bridge.short_from] += axis.bridge.short_A();
     current_A[axis.bridge.short_to] -= axis.bridge.short_A();
@@ -278,7 +278,7 @@ AxisTruth Bench::truth(int index) const {
   truth.housing_degC = axis.stove.degC(Place::housing);
   truth.frame_degC = axis.stove.degC(Place::frame);
   truth.magnet_degC = axis.stove.magnet_degC();
-  truth.current_A = axis.motor.current_A();
+  truth.current_A = axis.bridge.sampled_A(axis.motor);
   axis.motor.current_dq_A(truth.current_d_A, truth.current_q_A);
   truth.angle_rad = axis.motor.angle_rad();
   truth.speed_rad_per_s = axis.motor.speed_rad_per_s();

@@ -71,8 +71,8 @@ struct BoardRaw {
 struct AxisTruth {
   std::array<double, 3> phase_degC;
   double hottest_degC, winding_degC, teeth_degC, housing_degC, frame_degC, magnet_degC;
-  std::array<double, 3> current_A;
-  double current_d_A, current_q_A;
+  std::array<double, 3> current_A;  // now, when it is sampled
+  double current_d_A, current_q_A;  // mean
   double angle_rad, speed_rad_per_s, torque_Nm;
   double shaft_W;  // of the air gap, mean of the last period
   double shaft_J;  // given to the load so far

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A three-phase bridge made of numbers, one axis. In: duties and bus voltage for one PWM period; it drives the motor
 // and says what it took from the bus and what became heat in it. Two faithfulnesses:
-//   averaged: one motor step a period; dead time as a voltage error by current sign, ripple heat in closed form
+//   averaged: one motor step a period, whose currents are means; dead time as a voltage error by current sign. What the
+//             current does within the period, and by how much a sample of it misses its mean, in closed form
 //   switched: every edge, dead time with the diodes that really conduct, real ripple
 // Centre-aligned: a period begins and ends in the middle of the zero vector with all lower switches on, which is where
 // currents are sampled. Released (all six switches open) both modes follow the diodes.
@@ -35,8 +36,13 @@ struct BridgeWork {
   double short_J = 0;                  // in a shorted pair of leads
 };
 
-/// Mean square of each phase's ripple current over a PWM period, in units of (bus voltage * period / inductance)^2.
-std::array<double, 3> ripple_share(const std::array<double, 3>& ratio);
+/// Ripple current of each phase over a PWM period, in units of bus voltage * period / inductance (square: the square of
+/// that). It is zero where it is sampled, but drops voltage in the resistance, which leaves current behind: the sample
+/// misses `moment` * resistance * period / inductance of the mean (first order in that last factor).
+struct RippleShare {
+  std::array<double, 3> square{}, moment{}, edge{};  // edge: the ripple where the phase's pulse begins
+};
+RippleShare ripple_share(const std::array<double, 3>& ratio);
 
 class Bridge {
  public:
@@ -54,6 +60,8 @@ class Bridge {
   const BridgeDesign& design() const { return design_; }
   /// Current through the short that the current sensors see besides the motor's.
   double short_A() const { return short_A_; }
+  /// What flows in the middle of the zero vector, where a period ends; averaged, the motor's own currents are means.
+  std::array<double, 3> sampled_A(const Motor& motor) const;
 
  private:
   enum class Gate { upper, lower, off };
@@ -63,6 +71,8 @@ class Bridge {
                 const std::array<double, 3>& winding_ohm);
   void segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V,
                const std::array<double, 3>& winding_ohm);
+  void within_the_period(const Motor& motor, const std::array<double, 3>& start_A, const std::array<double, 3>& ratio,
+                         double bus_V, const std::array<double, 3>& winding_ohm);
   void charge_ripple(int phase, double squared_A2s, double winding_ohm);
   void charge_edges(const Motor& motor, const std::array<double, 3>& ratio, double bus_V);
   void carry_short(const std::array<double, 3>& ratio, double bus_V);
@@ -72,6 +82,7 @@ class Bridge {
   BridgeWork work_;
   double soft_A_ = 1e-3;  // below this current the ripple crosses zero and the dead time errs less
   double short_A_ = 0;
+  std::array<double, 3> missed_A_{};
 };
 
 }  // namespace host_sim

@@ -342,6 +342,11 @@ std::array<double, 3> Motor::back_emf_V() const {
   return {alpha_V, -0.5 * alpha_V + half_sqrt3 * beta_V, -0.5 * alpha_V - half_sqrt3 * beta_V};
 }
 
+std::array<double, 3> Motor::magnet_Wb() const {
+  const double alpha_Wb = magnet_Wb_ * cosine_, beta_Wb = magnet_Wb_ * sine_;
+  return {alpha_Wb, -0.5 * alpha_Wb + half_sqrt3 * beta_Wb, -0.5 * alpha_Wb - half_sqrt3 * beta_Wb};
+}
+
 double Motor::flux_of(double current_A, double inductance_H) const {
   if (design_.saturation_A == 0) return inductance_H * current_A;
   const double x = current_A / design_.saturation_A, s = design_.saturated_share;

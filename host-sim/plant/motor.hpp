@@ -95,6 +95,7 @@ class Motor {
   double angle_rad() const { return angle_rad_; }  // [0, 2 pi)
   long turns() const { return turns_; }
   double flux_linkage_Wb() const { return magnet_Wb_; }
+  std::array<double, 3> magnet_Wb() const;  // the magnet's flux in each phase
   double field_J() const;
   double kinetic_J() const;
   const MotorWork& work() const { return work_; }

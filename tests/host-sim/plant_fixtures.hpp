@@ -29,6 +29,48 @@ inline hal::Duty vector_duty(const host_sim::Motor& motor, double d_V, double q_
   return {{ratio(0), ratio(2 * host_sim::pi / 3), ratio(-2 * host_sim::pi / 3)}, true};
 }
 
+/// A motor turned at a speed whose current is held by what samples show of it. Cold resistance, no iron.
+class Turning {
+ public:
+  Turning(const wire::Motor& sheet, const host_sim::BridgeDesign& design, double rad_per_s)
+      : motor_(host_sim::motor_from_sheet(sheet), period_s), bridge_(design) {
+    motor_.load.mode = host_sim::Load::Mode::imposed_speed;
+    motor_.load.speed_rad_per_s = rad_per_s;
+    motor_.place(0.3, rad_per_s);
+    phase_ohm_.fill(sheet.phase_resistance_ohm);
+    motor_.set_resistance(phase_ohm_, design.on_resistance_ohm);
+  }
+
+  std::array<double, 3> sampled_A() const { return bridge_.sampled_A(motor_); }
+
+  /// One period at `bus_V` towards d = 0, q = `q_A`: the duty that it ran with.
+  hal::Duty period(double q_A, double bus_V) {
+    const std::array<double, 3> a = sampled_A();
+    const double alpha_A = a[0], beta_A = (a[1] - a[2]) / std::sqrt(3.0);
+    const double angle_rad = motor_.design().pole_pairs * motor_.angle_rad();
+    const double d = alpha_A * std::cos(angle_rad) + beta_A * std::sin(angle_rad),
+                 q = beta_A * std::cos(angle_rad) - alpha_A * std::sin(angle_rad);
+    d_V_ -= 0.01 * d, q_V_ += 0.01 * (q_A - q);
+    const double emf_V = motor_.design().pole_pairs * motor_.speed_rad_per_s() * motor_.flux_linkage_Wb();
+    const hal::Duty duty = vector_duty(motor_, d_V_ - 0.1 * d, emf_V + q_V_ + 0.1 * (q_A - q), bus_V);
+    bridge_.advance(motor_, duty, bus_V, phase_ohm_);
+    return duty;
+  }
+
+  /// Copper heat so far as the integral of the squared current vector.
+  double true_A2s() const {
+    double heat_J = 0;
+    for (std::size_t k = 0; k < 3; ++k) heat_J += motor_.work().copper_J[k] + bridge_.work().ripple_J[k];
+    return heat_J / 1.5 / phase_ohm_[0];
+  }
+
+ private:
+  host_sim::Motor motor_;
+  host_sim::Bridge bridge_;
+  std::array<double, 3> phase_ohm_;
+  double d_V_ = 0, q_V_ = 0;
+};
+
 inline host_sim::BenchDesign bench_design(const wire::Motor& motor) {
   host_sim::BenchDesign design;
   design.axes = {host_sim::axis_from_sheet(motor), host_sim::axis_from_sheet(motor)};

@@ -160,10 +160,12 @@ TEST(Losses, RippleAgreesWithTheSwitchedBridge) {
   for (const wire::Abc& d : {wire::Abc{0.7f, 0.5f, 0.3f}, wire::Abc{0.2f, 0.9f, 0.4f}, wire::Abc{0.45f, 0.5f, 0.95f},
                              wire::Abc{0.1f, 0.1f, 0.8f}, wire::Abc{0.6f, 0.05f, 0.55f}}) {
     const double truth = switched_ripple_A2(d, 48, 30e-6, 20000);
-    EXPECT_NEAR(static_cast<double>(thermal::ripple_A2(d, 48, 30e-6f, 20000)), truth, 1e-3 * truth + 1e-4);
+    const thermal::Switching by{48, 0, 30e-6f, 20000, 0};  // neither resistance nor dead time: ripple alone
+    EXPECT_NEAR(static_cast<double>(thermal::unseen_A2(d, {0, 0, 0}, by)), truth, 1e-3 * truth + 1e-4);
     EXPECT_GT(truth, 1.0);
   }
-  EXPECT_EQ(thermal::ripple_A2({0.5f, 0.5f, 0.5f}, 48, 30e-6f, 20000), 0.0f) << "equal duties drive nothing";
+  EXPECT_EQ(thermal::unseen_A2({0.5f, 0.5f, 0.5f}, {1, 0, -1}, {48, 0.5f, 30e-6f, 20000, 5e-7f}), 0.0f)
+      << "equal duties drive nothing";
 }
 
 TEST(Losses, BusPowerIsCopperLossAndNeverCools) {

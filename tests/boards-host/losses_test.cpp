@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// What the firmware adds to the heat of its samples, judged by what a bridge that switches every edge really did.
+#include "thermal/losses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/host-sim/plant_fixtures.hpp"
+
+namespace {
+
+TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
+  // Held against a bridge that switches every edge; the firmware's share of the heat is what samples say and unseen_A2.
+  double hidden = 0;
+  for (const char* id : {"ec-16-40w", "ec-powermax-30-24v"}) {
+    const wire::Motor sheet = plant_tests::sheet(id);
+    host_sim::BridgeDesign design;
+    design.switched = true;
+    for (const double speed : {0.0, 0.3, 0.9}) {      // of the speed at which the back-EMF takes 20 V of each phase
+      for (const double current : {1.0, 3.0, 7.0}) {  // times the rated one
+        const double q_A = current * sheet.rated_current_A;
+        const double rad_per_s = speed * 20 / sheet.pole_pairs / sheet.flux_linkage_Wb;
+        const double turn_rad = rad_per_s * sheet.pole_pairs * plant_tests::period_s;
+        plant_tests::Turning turning(sheet, design, rad_per_s);
+        for (int n = 0; n < 3000; ++n) turning.period(q_A, 48);
+        const double before_A2s = turning.true_A2s();
+        double sampled_A2s = 0, unseen_A2s = 0;
+        for (int n = 0; n < 2000; ++n) {
+          const std::array<double, 3> a = turning.sampled_A();
+          sampled_A2s += (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) / 1.5 * plant_tests::period_s;
+          const wire::Abc sample_A = {static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])};
+          const thermal::Switching by = {48, static_cast<float>(sheet.phase_resistance_ohm),
+                                         static_cast<float>(sheet.inductance_d_H), static_cast<float>(design.pwm_Hz),
+                                         static_cast<float>(design.dead_time_s)};
+          const hal::Duty duty = turning.period(q_A, 48);
+          const float turning_A2 =
+              thermal::turning_A2(0, static_cast<float>(q_A), static_cast<float>(sheet.flux_linkage_Wb),
+                                  static_cast<float>(turn_rad), by.inductance_H);
+          unseen_A2s +=
+              static_cast<double>(thermal::unseen_A2(duty.ratio, sample_A, by) + turning_A2) * plant_tests::period_s;
+        }
+        const double true_A2s = turning.true_A2s() - before_A2s;
+        // Too hot by more where ripple turns the current round at an edge: dead time then shifts a pulse only at times.
+        const double share = (sampled_A2s + unseen_A2s) / true_A2s;
+        EXPECT_TRUE(share > 0.99 && share < 1.06)
+            << share << ": " << id << " at " << speed << ", " << current << " times the rated current: samples alone "
+            << sampled_A2s / true_A2s;
+        hidden = std::max(hidden, 1 - sampled_A2s / true_A2s);
+      }
+    }
+  }
+  EXPECT_GT(hidden, 0.3) << "nothing was hidden, so nothing was shown";
+}
+
+}  // namespace
