@@ -93,8 +93,7 @@ Inputs inputs_of(const Log& log, Bins& out) {
             "iq_A (an amplitude) carries more than current_A (direct) allows and is not used; check both units.");
     }
   } else {
-    in.amplitude_A = in.sampled_A =
-        log.has(Role::iq) && log.has(Role::id) ? sampled_A(log) : std::vector<double>(t.size(), 0.0);
+    in.amplitude_A = in.sampled_A = log.has(Role::iq) ? sampled_A(log) : std::vector<double>(t.size(), 0.0);
   }
   out.has_power = log.has(Role::power);
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
@@ -252,8 +251,10 @@ Bins bins_of(const Log& log, double finest_s) {
     throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
   };
   if (t.size() < 30)
-    refuse(fmt::format("only {} row{} over {:.1f} s, too few to fit a motor; record some minutes.", t.size(),
-                       t.size() == 1 ? "" : "s", t.back()));
+    refuse(
+        fmt::format("only {} row{} over {:.1f} s, and 30 are the least to fit a motor; record more of them (a "
+                    "temperature that was read now and then may leave its cell empty).",
+                    t.size(), t.size() == 1 ? "" : "s", t.back()));
   if (!(usual_s > 0))
     refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
   out.width_s = width_s_of(log, usual_s, finest_s);

@@ -38,9 +38,11 @@ const std::map<std::string, Unit>& units() {
       {"mV", {"voltage", 1e-3, 0}},
       {"degC", {"temperature", 1, 0}},
       {"C", {"temperature", 1, 0}},
+      {"°C", {"temperature", 1, 0}},
       {"K", {"temperature", 1, -273.15}},
       {"degF", {"temperature", 5.0 / 9.0, -32}},
       {"F", {"temperature", 5.0 / 9.0, -32}},
+      {"°F", {"temperature", 5.0 / 9.0, -32}},
       {"rad_per_s", {"speed", 1, 0}},
       {"rad/s", {"speed", 1, 0}},
       {"rpm", {"speed", pi / 30, 0}},
@@ -61,6 +63,12 @@ std::optional<Unit> unit_named(const std::string& unit) {
   return at == units().end() ? std::nullopt : std::optional<Unit>(at->second);
 }
 
+std::vector<std::string> unit_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, unused] : units()) names.push_back(name);
+  return names;
+}
+
 std::string quantity_of(const std::string& suffix) {
   const auto unit = unit_named(suffix);
   return unit ? unit->quantity : std::string();
@@ -69,11 +77,9 @@ std::string quantity_of(const std::string& suffix) {
 void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor,
                 double& offset) {
   const auto known = unit_named(unit);
-  if (!known) {
-    std::vector<std::string> names;
-    for (const auto& [name, unused] : units()) names.push_back(name);
-    throw UserError(Exit::usage, fmt::format("{}: unknown unit '{}'; units: {}.", where, unit, fmt::join(names, ", ")));
-  }
+  if (!known)
+    throw UserError(Exit::usage,
+                    fmt::format("{}: unknown unit '{}'; units: {}.", where, unit, fmt::join(unit_names(), ", ")));
   std::string wanted;
   for (std::size_t cut = role.find('_'); cut != std::string::npos && wanted.empty(); cut = role.find('_', cut + 1)) {
     wanted = quantity_of(role.substr(cut + 1));

@@ -39,6 +39,7 @@ std::vector<Rung> ladder_of(const Search& found) {
     if (!seen.insert(id).second) continue;
     const bool chosen = named_clearly(found.verdict) && !found.tied.empty() && holds(found.tied.front(), id);
     const bool tied =
+        found.verdict == Verdict::ambiguous &&
         std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
     out.push_back({id, cause_of(c.fit.chosen.front()).name, c.gain, chosen, tied && !chosen});
   }
@@ -135,6 +136,16 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     }
     span = std::max(span, high - low);
   }
+  // Three would fit any curve that the four parameters and two initial states can make; two dozen leave some to judge
+  // by.
+  for (const Bins& log : problem.logs) {
+    float housing = 0, core = 0;
+    for (const Bin& bin : log.bins) housing += bin.housing_n, core += bin.core_n;
+    constexpr float least = 20;
+    if (log.housing_step_K == 0 && std::max(housing, core) < least)
+      return fmt::format("{}: {:.0f} readings of a temperature are too few, {:.0f} the least; read it more often.",
+                         log.name, static_cast<double>(std::max(housing, core)), static_cast<double>(least));
+  }
   if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
@@ -161,6 +172,24 @@ std::string too_poor(const Problem& problem, const Fit& base) {
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
   return "";
+}
+
+/// What the logs do not hold, and the causes that could not be tried without it; empty when there are none.
+std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
+  const std::pair<Needs, Role> wanted[] = {
+      {Needs::speed, Role::speed}, {Needs::frame, Role::frame}, {Needs::neighbour, Role::neighbour}};
+  std::string out;
+  for (const auto& [needs, role] : wanted) {
+    const bool there = std::any_of(logs.begin(), logs.end(), [role = role](const Log& log) { return log.has(role); });
+    std::vector<std::string> ids;
+    for (const Cause& cause : causes()) {
+      if (cause.needs == needs && !problem.possible(cause)) ids.emplace_back(cause.id);
+    }
+    if (!ids.empty() && (!there || needs == Needs::speed))
+      out += fmt::format("{}{} {} ({})", out.empty() ? "" : "; ", own_name(role), there ? "never moves" : "is missing",
+                         listed(ids, ", "));
+  }
+  return out.empty() ? out : "Not tried, since a column does not tell: " + out + ".";
 }
 
 /// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
@@ -325,14 +354,19 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   const Problem whole = problem_of(logs, motor);
   Problem problem = held.fraction > 0 ? first_part(whole, held.fraction) : whole;
   const Fit base = judge_baseline(problem, logs, motor, report);
-  report.reasoning.push_back(
-      problem.noise.idle_s > 60
-          ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.",
-                        problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.idle_s)
-          : fmt::format(
-                "Noise of a housing reading: {:.3f} K white from its differences; {:.3f} K slow, mostly assumed, "
-                "for lack of rest.",
-                problem.noise.housing_white_K, problem.noise.housing_slow_K));
+  const bool housing = !std::isnan(report.baseline_rmse.housing_K);
+  if (housing)
+    report.reasoning.push_back(
+        problem.noise.idle_s > 60
+            ? fmt::format("Noise of a housing reading: {:.3f} K white, {:.3f} K slow, from {:.0f} s of rest.",
+                          problem.noise.housing_white_K, problem.noise.housing_slow_K, problem.noise.idle_s)
+            : fmt::format(
+                  "Noise of a housing reading: {:.3f} K white from its differences; {:.3f} K slow, mostly assumed, "
+                  "for lack of rest.",
+                  problem.noise.housing_white_K, problem.noise.housing_slow_K));
+  if (problem.any_core())
+    report.reasoning.push_back(
+        fmt::format("Noise of a winding reading: {:.2f} K white from its differences.", problem.noise.core_white_K));
   std::string poor = too_poor(problem, base);
   Search found;
   if (poor.empty()) {
@@ -359,10 +393,14 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
+    const std::string untried = not_tried(problem, logs);
+    if (!untried.empty())
+      (found.verdict == Verdict::unknown_cause ? report.notes : report.reasoning).push_back(untried);
   }
   const Offer given = for_the_board(problem, found, report);
   if (extended) {
     add_extended(problem, found.chosen.fit, report, 0);
+    report.extended = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()));
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *given.fit);
   }
   if (poor.empty()) {

@@ -78,13 +78,21 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
       }
     }
   }
-  for (const auto& [role, source] : found) {
+  for (auto& [role, source] : found) {
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1) {
       throw UserError(Exit::unusable, fmt::format("{}: column '{}' stands there twice; rename or delete one of them.",
                                                   table.file, source.column));
     }
     const std::string& complaint = table.complaints[static_cast<std::size_t>(table.find(source.column))];
     if (!complaint.empty()) throw UserError(Exit::unusable, complaint);
+    if (table.units.empty() || source.unit_said) continue;
+    std::string unit = table.units[static_cast<std::size_t>(table.find(source.column))];
+    if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+    if (!unit.empty())
+      apply_unit(unit, own_name(role),
+                 fmt::format("{}: the row of units below the header, column '{}' (--column {}={}:UNIT overrules it)",
+                             table.file, source.column, own_name(role), source.column),
+                 source.factor, source.offset);
   }
   return found;
 }
@@ -254,6 +262,10 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
 
 }  // namespace
 
+std::string roles_and_units() {
+  return fmt::format("roles: {}\nunits: {}", fmt::join(own_names(), ", "), fmt::join(unit_names(), ", "));
+}
+
 const std::string& own_name(Role role) { return own_names()[static_cast<std::size_t>(role)]; }
 
 void add_column(ColumnMap& map, const std::string& text, const std::string& from) {
@@ -269,8 +281,10 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
     throw UserError(Exit::usage, where + ": the column's name is missing behind '='.");
   }
   Source source{rest.substr(0, colon)};
-  if (colon != std::string::npos)
+  if (colon != std::string::npos) {
     apply_unit(rest.substr(colon + 1), own_name(role), where, source.factor, source.offset);
+    source.unit_said = true;
+  }
   map.columns[role] = source;
 }
 
@@ -284,8 +298,8 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   };
   const auto has = [&](Role r) { return found.count(r) != 0; };
   need(has(Role::time), "a time column", "call it time_s or say --column time_s=NAME");
-  need(has(Role::current) || (has(Role::id) && has(Role::iq)) || has(Role::power),
-       "the heat input (current_A, id_A and iq_A, or power_W)", "map it with --column current_A=NAME");
+  need(has(Role::current) || has(Role::iq) || has(Role::power), "the heat input (current_A, iq_A or power_W)",
+       "map it with --column current_A=NAME");
   need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)",
        "map it with --column housing_degC=NAME");
 

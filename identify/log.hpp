@@ -41,12 +41,16 @@ enum class Role {
 };
 inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
 
+/// Every role and every unit that a column may be given, one line each, for --help.
+std::string roles_and_units();
+
 /// The name under which a role is recognised without a map, unit included ("housing_degC").
 const std::string& own_name(Role role);
 
 struct Source {
   std::string column;
   double factor = 1, offset = 0;  // SI = factor * (cell + offset)
+  bool unit_said = false;         // else a row of units in the table may say it
 };
 
 /// Which column plays which role, and how its unit becomes ours.

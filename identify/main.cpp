@@ -163,7 +163,8 @@ int main(int argc, char** argv) {
       "motor file (.toml), or the name of one in boards/motors (or in the folder that HOTCORE_MOTORS names); "
       "without it the answer is less certain");
   app.add_option("--map", a.map, "TOML file that says which column is what");
-  app.add_option("--column", a.columns, "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated)")
+  app.add_option("--column", a.columns,
+                 "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated; see below)")
       ->allow_extra_args(false);
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,
@@ -184,6 +185,9 @@ int main(int argc, char** argv) {
   for (const char* other : {"--hold-out", "--json", "--html", "--write-model", "--write-baseline", "--explain"})
     score->excludes(other);
   app.footer(
+      "What a column may be (--column ROLE=NAME or ROLE=NAME:UNIT; a column called like its role needs no word):\n" +
+      identify::roles_and_units() +
+      "\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used. With 2 and 3 one sentence on standard error says why.");
   app.failure_message([](const CLI::App*, const CLI::Error& error) {

@@ -132,14 +132,33 @@ void read_between_steps(Log& log, Role role) {
       own_name(role), step_K, unhurried.size(), steps.size()));
 }
 
+/// Share of a channel that is missing. One that comes regularly but not in every row, as from a bus whose messages were
+/// written one a row, is judged by its own interval.
+double missing_of_input(const Log& log, Role role) {
+  const auto &v = log.of(role), &t = log.of(Role::time);
+  std::vector<double> spacing_s;
+  double last_s = missing;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    if (!std::isnan(last_s)) spacing_s.push_back(t[i] - last_s);
+    last_s = t[i];
+  }
+  const double grid_s = median(spacing_s);
+  const auto late = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) { return s > 1.5 * grid_s; });
+  const double of_rows = static_cast<double>(count_missing(v)) / static_cast<double>(v.size());
+  if (spacing_s.size() < 10 || 10 * static_cast<std::size_t>(late) > spacing_s.size()) return of_rows;
+  return std::max(0.0, 1 - static_cast<double>(spacing_s.size() + 1) * grid_s / (t.back() - t.front() + grid_s));
+}
+
 /// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
 void note_missing_input(Log& log) {
   std::vector<Role> input = {Role::power};
-  if (!log.has(Role::power))
-    input = log.has(Role::current) ? std::vector<Role>{Role::current} : std::vector<Role>{Role::id, Role::iq};
+  if (!log.has(Role::power)) input = {log.has(Role::current) ? Role::current : Role::iq};
+  if (input.front() == Role::iq && log.has(Role::id)) input.push_back(Role::id);
+  if (input.front() == Role::iq && !log.has(Role::id))
+    log.notes.push_back("id_A is missing; all current is taken to make torque.");
   for (const Role role : input) {
-    const double share =
-        static_cast<double>(count_missing(log.of(role))) / static_cast<double>(log.of(Role::time).size());
+    const double share = missing_of_input(log, role);
     log.missing_share = std::max(log.missing_share, share);
     if (share > 0.3) {
       throw UserError(
@@ -148,7 +167,7 @@ void note_missing_input(Log& log) {
                       "again with every row filled.",
                       log.name, own_name(role), 100 * share));
     }
-    if (share > 0)
+    if (share > 5e-4)
       log.notes.push_back(fmt::format("{} is missing in {:.1f} % of the rows; bridged by its neighbours.",
                                       own_name(role), 100 * share));
   }
@@ -224,7 +243,10 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
     // A coarse channel rests at one step for long when nothing happens. It was frozen only if it then jumps by several.
     const bool fine = usual <= 2;
     const bool jumps = r + 1 < runs.size() && steps[r] > 4 * step;
-    if (fine || jumps) frozen.emplace_back(runs[r].from, runs[r].to);
+    // Where a smooth channel turns round, it dwells on the values before and after as well, one step away.
+    const bool turns = r > 0 && r + 1 < runs.size() && std::max(steps[r - 1], steps[r]) < 2 * step &&
+                       6 * std::max(lengths[r - 1], lengths[r + 1]) > lengths[r];
+    if ((fine && !turns) || jumps) frozen.emplace_back(runs[r].from, runs[r].to);
   }
   return frozen;
 }

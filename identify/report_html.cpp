@@ -155,6 +155,7 @@ std::string named(const Report& r) {
          fmt::format("</table><p>Easily taken for: {}; told from them by: {}.</p>\n", escaped(c.easily_taken_for),
                      escaped(c.experiment));
   }
+  if (!r.extended.empty()) s += "<h2>The rest of that model</h2><table>" + parameter_rows(r.extended) + "</table>\n";
   return s;
 }
 

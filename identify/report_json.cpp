@@ -80,6 +80,7 @@ std::string as_json(const Report& r) {
   }
   out["tied"] = r.tied;
   out["rmse_with_causes_K"] = r.causes.empty() ? ordered_json(nullptr) : rms(r.extended_rmse);
+  out["parameters_with_causes"] = parameters(r.extended);
   out["candidates"] = ordered_json::array();
   for (const Rung& rung : r.ladder) {
     out["candidates"].push_back(

@@ -91,8 +91,9 @@ std::string named(const Report& r) {
     for (const Rival& rival : c.rivals) s += fmt::format("  rival: {} ({:.1f} behind)\n", rival.id, rival.behind);
     s += fmt::format("  easily taken for: {}; told from them by: {}\n", c.easily_taken_for, c.experiment);
   }
-  if (!r.causes.empty())
-    s += fmt::format("\nWith {} the model misses by: {}\n", r.causes.size() > 1 ? "them" : "it", rmse(r.extended_rmse));
+  if (r.causes.empty()) return s;
+  s += fmt::format("\nWith {} the model misses by: {}\n", r.causes.size() > 1 ? "them" : "it", rmse(r.extended_rmse));
+  for (const ParameterLine& p : r.extended) s += line_of(p);
   return s;
 }
 
@@ -140,6 +141,7 @@ std::string interval_words(const HeldOut& h) {
 }
 
 std::string whiteness_words(const Whiteness& w) {
+  if (w.ratio == 0) return "too few housing readings to tell whether the residual is noise";
   return fmt::format(
       "the residual is {:.2f} times the noise; a right model leaves one so unlike white noise with a chance of {:.2g} "
       "(cumulated periodogram) or {:.2g} (Ljung-Box)",

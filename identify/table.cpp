@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -72,6 +73,51 @@ bool means_missing(std::string_view s) {
   return low == "nan" || low == "na" || low == "n/a" || low == "null" || low == "none" || low == "-" || low == "-nan";
 }
 
+/// Digits and nothing else as a whole number.
+bool digits(std::string_view s, int& value) {
+  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
+  return error == std::errc() && end == s.data() + s.size() && s.front() != '-';
+}
+
+/// 08:15:30.5 as seconds.
+bool time_of_day(std::string_view s, double& value) {
+  int hour = 0, minute = 0;
+  if (s.size() < 8 || s[2] != ':' || s[5] != ':' || !digits(s.substr(0, 2), hour) || !digits(s.substr(3, 2), minute))
+    return false;
+  double second = 0;
+  const auto [end, error] = std::from_chars(s.data() + 6, s.data() + s.size(), second);
+  if (error != std::errc() || end != s.data() + s.size() || !(second >= 0 && second < 61)) return false;
+  value = 3600 * hour + 60 * minute + second;
+  return true;
+}
+
+/// A date and time as ISO 8601 writes it (2026-11-21T08:15:30.5+01:00, or with a blank), s since 1970; or a time of
+/// day.
+bool moment(std::string_view s, double& value) {
+  int year = 0, month = 0, day = 0, hours = 0, minutes = 0;
+  if (time_of_day(s, value)) return true;
+  if (s.size() < 19 || s[4] != '-' || s[7] != '-' || (s[10] != 'T' && s[10] != ' ') || !digits(s.substr(0, 4), year) ||
+      !digits(s.substr(5, 2), month) || !digits(s.substr(8, 2), day))
+    return false;
+  const std::chrono::year_month_day date(std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day)));
+  std::string_view clock = s.substr(11);
+  double ahead_s = 0;
+  if (clock.back() == 'Z') {
+    clock.remove_suffix(1);
+  } else if (const std::size_t sign = clock.find_first_of("+-"); sign != std::string_view::npos) {
+    std::string_view zone = clock.substr(sign + 1);
+    if (zone.size() < 2 || !digits(zone.substr(0, 2), hours)) return false;
+    zone.remove_prefix(zone.size() > 2 && zone[2] == ':' ? 3 : 2);
+    if (!zone.empty() && !digits(zone, minutes)) return false;
+    ahead_s = (clock[sign] == '-' ? -60 : 60) * (60 * hours + minutes);
+    clock = clock.substr(0, sign);
+  }
+  if (!date.ok() || !time_of_day(clock, value)) return false;
+  value += 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) - ahead_s;
+  return true;
+}
+
 /// A cell as a number; false when it is neither a number nor a word for "missing". An infinite value counts as missing.
 bool number(std::string_view s, bool decimal_comma, double& value) {
   if (means_missing(s)) return value = missing, true;
@@ -84,9 +130,17 @@ bool number(std::string_view s, bool decimal_comma, double& value) {
   if (s.front() == '+') s.remove_prefix(1);
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
   if (error == std::errc::result_out_of_range) return value = missing, end == s.data() + s.size();
-  if (error != std::errc() || end != s.data() + s.size()) return value = missing, false;
+  if (error != std::errc() || end != s.data() + s.size()) return moment(s, value) || (value = missing, false);
   if (!std::isfinite(value)) value = missing;
   return true;
+}
+
+/// No number in it and something else: the row of units that some loggers write below the header.
+bool all_words(const std::vector<std::string_view>& cells, bool decimal_comma) {
+  double unused = 0;
+  return std::none_of(cells.begin(), cells.end(),
+                      [&](auto cell) { return !means_missing(cell) && number(cell, decimal_comma, unused); }) &&
+         !std::all_of(cells.begin(), cells.end(), means_missing);
 }
 
 std::string shown(std::string_view s) { return std::string(s.substr(0, 40)) + (s.size() > 40 ? "..." : ""); }
@@ -123,7 +177,8 @@ Table read_table(const std::string& path) {
     refuse(1, "the file is UTF-16; save it as UTF-8 text.");
   }
   char separator = ',';
-  std::vector<std::string_view> cells;
+  std::vector<std::string_view> cells, header;
+  std::string_view remark;  // the last '#' line: some programs write the header there
   for (int line = 1; !rest.empty(); ++line) {
     const std::size_t end = rest.find('\n');
     const bool closed = end != std::string_view::npos;
@@ -136,20 +191,28 @@ Table read_table(const std::string& path) {
     row = trimmed(row);
     if (row.find('\0') != std::string_view::npos)
       refuse(line, "a zero byte; this is not a text file: export the log as CSV.");
-    if (row.empty() || row.front() == '#') continue;
+    if (row.empty()) continue;
+    if (row.front() == '#') {
+      remark = trimmed(row.substr(1));
+      continue;
+    }
     if (table.names.empty()) {
       separator = separator_of(row);
       if (!split(row, separator, cells)) refuse(line, "a quote is opened and never closed; repair the header.");
-      for (const auto cell : cells) table.names.emplace_back(trimmed(cell));
       double unused = 0;
-      if (number(cells.front(), separator == ';', unused) && std::isfinite(unused)) {
+      const bool numbers = number(cells.front(), separator == ';', unused) && std::isfinite(unused);
+      header = cells;
+      if (numbers && (!split(remark, separator, header) || header.size() != cells.size() ||
+                      !all_words(header, separator == ';'))) {
         refuse(line,
                "numbers where the header should be; put a line with column names (such as "
                "time_s,current_A,housing_degC) first.");
       }
+      while (header.size() > 1 && header.back().empty()) header.pop_back();
+      for (const auto name : header) table.names.emplace_back(trimmed(name));
       table.columns.resize(table.names.size());
       table.complaints.resize(table.names.size());
-      continue;
+      if (!numbers) continue;
     }
     // A separator at the end of every row is some loggers' habit; one cell too many and empty is not a mistake.
     const bool whole = split(row, separator, cells);
@@ -160,6 +223,10 @@ Table read_table(const std::string& path) {
                  "the row has {} of {} cells{}", cells.size(), table.names.size(),
                  closed ? "; repair or delete this line."
                         : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
+    }
+    if (table.line.empty() && table.units.empty() && all_words(cells, separator == ';')) {
+      for (const auto unit : cells) table.units.emplace_back(unit);
+      continue;
     }
     for (std::size_t c = 0; c < cells.size(); ++c) {
       double value = missing;

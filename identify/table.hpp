@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
 //
-//   in   a file: comma, semicolon or tab; quotes; CRLF; byte-order mark; '#' lines before the header; decimal comma
-//        when the separator is a semicolon
+//   in   a file: comma, semicolon or tab; quotes; CRLF; byte-order mark; '#' lines before the header, or before it as
+//        well; a row of units below it; decimal comma when the separator is a semicolon; times as ISO 8601 writes them
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
 //        mistake only for who uses it
 //
@@ -20,6 +20,7 @@ inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 struct Table {
   std::string file;
   std::vector<std::string> names;
+  std::vector<std::string> units;            // as a row below the header gives them; empty without such a row
   std::vector<std::vector<double>> columns;  // columns[c][row]
   std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
   std::vector<int> line;                     // line number of each row, for sentences

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace identify {
 
@@ -13,6 +14,7 @@ struct Unit {
 };
 
 std::optional<Unit> unit_named(const std::string& unit);
+std::vector<std::string> unit_names();
 
 /// Quantity of one of our own unit suffixes ("A", "degC", "rad_per_s"); empty when it is none.
 std::string quantity_of(const std::string& suffix);

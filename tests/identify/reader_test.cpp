@@ -71,6 +71,49 @@ TEST(Reader, TabsAreUnderstood) {
   EXPECT_DOUBLE_EQ(read("time_s\tcurrent_A\thousing_degC\n0\t1\t20\n1\t2\t21\n")[0].of(Role::housing)[1], 21);
 }
 
+TEST(Reader, AHeaderBehindAHashIsAHeader) {
+  const auto logs = read("# logger 3\n# time_s,current_A,housing_degC\n0,1,20\n1,2,21\n");
+  ASSERT_EQ(logs[0].of(Role::time).size(), 2u);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[1], 2);
+  says(complaint("# logger 3\n0,1,20\n"), "where the header should be");
+  says(complaint("# 0,1,19\n0,1,20\n"), "where the header should be");
+}
+
+TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
+  const std::string text = "time_s,iq_A,T\nms,[A],°F\n0,1,50\n1500,2,212\n";
+  ColumnMap map;
+  add_column(map, "housing_degC=T");
+  const auto logs = read(text, map);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::time)[1], 1.5);
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::iq)[1], 2);
+  EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
+  add_column(map, "housing_degC=T:degC");
+  EXPECT_DOUBLE_EQ(read(text, map)[0].of(Role::housing)[0], 50);
+  says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n", {}, 2), "unknown unit 'Arms'");
+}
+
+TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
+  const auto time_s = [](const std::string& from, const std::string& to) {
+    return read(head + from + ",1,20\n" + to + ",2,21\n")[0].of(Role::time)[1];
+  };
+  EXPECT_NEAR(time_s("2025-12-31T23:59:59.5", "2026-01-01T00:00:01"), 1.5, 1e-6);
+  EXPECT_NEAR(time_s("2024-02-28 12:00:00Z", "2024-03-01 12:00:00Z"), 2 * 86400, 1e-6) << "a leap year";
+  EXPECT_NEAR(time_s("2025-06-01T10:00:00+02:00", "2025-06-01T08:00:30Z"), 30, 1e-6);
+  EXPECT_NEAR(time_s("09:59:58", "10:00:00.25"), 2.25, 1e-9);
+  for (const char* not_a_time : {"2025-13-01T00:00:00", "2025-06-31T00:00:00", "10:00", "noon", "2025-06-01"})
+    says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
+}
+
+TEST(Reader, ATrailingSeparatorInTheHeaderMakesNoColumn) {
+  EXPECT_EQ(identify::read_table(file("time_s;current_A;housing_degC;\n0;1;20;\n")).names.size(), 3u);
+}
+
+TEST(Reader, TorqueCurrentAloneIsAHeatAndSaysSo) {
+  const Log log = read("time_s,iq_A,housing_degC\n0,1,20\n1,2,21\n2,2,22\n")[0];
+  ASSERT_FALSE(log.notes.empty());
+  says(log.notes[0], "all current is taken to make torque");
+}
+
 TEST(Reader, UnitsOfMappedColumnsBecomeSi) {
   ColumnMap map;
   identify::add_column(map, "time_s=ms:ms");
@@ -183,6 +226,15 @@ TEST(Reader, RowsWithoutTimeAreRefusedWhenMany) {
 TEST(Reader, AnInputThatIsMostlyMissingIsRefused) {
   says(complaint(head + "0,1,20\n1,,20\n2,,20\n3,1,20\n"), "current_A is missing in 50 % of the rows");
 }
+TEST(Reader, MessagesThatCameOneARowAreJudgedByTheirOwnInterval) {
+  std::string merged = head, torn = head;
+  for (int i = 0; i < 300; ++i) {
+    merged += std::to_string(0.1 * i) + (i % 3 == 0 ? ",2," : i % 3 == 1 ? ",,21" : ",,") + "\n";
+    torn += std::to_string(0.1 * i) + ((i * 7919) % 13 < 5 ? ",2," : ",,") + "21\n";
+  }
+  EXPECT_LT(read(merged)[0].missing_share, 0.05);
+  says(complaint(torn), "is missing in 6");
+}
 TEST(Reader, AColumnOfNothingCountsAsMissing) { says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature"); }
 TEST(Reader, RowsOutsideOfEverySessionAreSaid) {
   const auto logs = read("session,time_s,current_A,housing_degC\n1,0,1,20\n,1,1,20\n1,2,1,21\n");
@@ -232,6 +284,11 @@ TEST(Masks, AFrozenStretchOfAMovingChannelIsFound) {
   ASSERT_EQ(runs.size(), 1u);
   EXPECT_EQ(runs[0].first, 150u);
   EXPECT_EQ(runs[0].second, 190u);
+}
+TEST(Masks, AFineChannelThatTurnsRoundIsNotFrozen) {
+  std::vector<double> v;
+  for (int i = 0; i < 800; ++i) v.push_back(0.06 * std::round((20 + 30 * std::sin(i / 250.0)) / 0.06));
+  EXPECT_TRUE(identify::frozen_runs(v).empty());
 }
 TEST(Masks, ACoarseOrConstantChannelIsNotFrozen) {
   EXPECT_TRUE(identify::frozen_runs(std::vector<double>(500, 25.0)).empty());

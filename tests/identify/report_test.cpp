@@ -243,6 +243,25 @@ TEST(BadInput, FortyPercentMissing) {
           "40 % of the readings or rows are missing");
 }
 
+TEST(BadInput, ATemperatureReadEightTimes) {
+  refused(spoilt([](auto& row, int number) {
+            if (number % 1200 != 0) row[3] = "";
+            return row[5] = "", true;
+          }),
+          "8 readings of a temperature are too few");
+}
+
+TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
+  const Outcome r = run(spoilt([](auto& row, int) { return row[2] = "", true; }) + " --motor ec-16-40w --explain");
+  EXPECT_EQ(r.code, 0);
+  EXPECT_NE(r.out.find("Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, "),
+            std::string::npos)
+      << r.out;
+  const Outcome stands =
+      run(spoilt([](auto& row, int) { return row[2] = "0", true; }) + " --motor ec-16-40w --explain");
+  EXPECT_NE(stands.out.find("speed_rad_per_s never moves ("), std::string::npos) << stands.out;
+}
+
 TEST(BadInput, TwoClocksTwoMinutesApart) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   std::vector<std::string> earlier;
