@@ -46,6 +46,7 @@ struct Bins {
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
   double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences
   double missing_share = 0, gap_share = 0, housing_step_K = 0;  // as in Log
+  double uneven_per_A2 = 0;                                     // as in Problem
   std::vector<std::string> notes;
 
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }

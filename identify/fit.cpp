@@ -18,10 +18,10 @@ const double ordinary_uneven_share = 1 / std::sqrt(3.0);
 /// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
 /// host-sim's default motor: a standard deviation is one of these more or less.
 constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
-/// Of the heat, where the current squared is its mean over the heat: a standard deviation. Recorded at top speed, at
-/// 0.9, 1.3 and 1.9 of that, host-sim's current says 0.4, 0.9 and 1.0 percent more heat than the plant's joules
-/// (designed, hide and seed 2105).
-constexpr double ordinary_load_share = 0.005;
+/// Of the heat, where the current squared is its mean over the heat: a standard deviation. From rest to top speed the
+/// current that host-sim records says -0.1 to 0.7 percent more heat than the plant's joules (duty and designed, seed
+/// 5012).
+constexpr double ordinary_load_share = 0.002;
 /// In the middle of what catalogues have (maxon, of 5 to 200 W: R1 0.03..1.4 of R2, C1 0.02..0.6 of C2).
 constexpr double usual_R1_share = 0.2, usual_C1_share = 0.11;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
@@ -444,6 +444,15 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
   }
 }
 
+/// The motor that a fit found, without its causes.
+Fit bare(const Fit& f) {
+  Fit out = f;
+  out.chosen.clear();
+  out.x.resize(f.x.size() - f.cause_coordinates());
+  out.x << f.x.head(base_count), f.x.tail(out.x.size() - base_count);
+  return out;
+}
+
 }  // namespace
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
@@ -528,7 +537,8 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   return usual.cost < best.cost ? usual : best;
 }
 
-std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors) {
+std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
+  const Fit two_resistors = bare(motor);
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
   constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
@@ -550,13 +560,14 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resis
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
-                   held = replayed(problem, framed, l), warmed = replayed(uneven, two_resistors, l);
+                   held = replayed(problem, framed, l), even = replayed(problem, motor, l),
+                   warmed = replayed(uneven, motor, l);
     lateness.housing_K.push_back(apart_K(lagged.housing_degC, plain.housing_degC, late_s / tried_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
-    phases.housing_K.push_back(apart_K(warmed.housing_degC, plain.housing_degC));
-    phases.core_K.push_back(apart_K(warmed.core_degC, plain.core_degC));
+    phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
+    phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
   }
   if (!(problem.uneven_per_A2 > 0)) return {lateness, frame};
   return {lateness, frame, phases};

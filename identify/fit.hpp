@@ -48,9 +48,9 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 
 /// What no motor is without: a sensor that is not quite on the housing, so that its reading comes early or late by
 /// seconds; a frame that takes a share of the housing's capacity; and, where the rotor stands under load, phases that
-/// share their heat better or worse than was assumed. Causes are to be ranked by more than that. `two_resistors`: the
-/// baseline's fit.
-std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& two_resistors);
+/// share their heat better or worse than was assumed. Causes are to be ranked by more than that. By the best fit
+/// at hand: where something is missing, that of two resistors alone is no motor.
+std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor);
 
 /// Heat that goes otherwise with load than the recorded current's square says, as current sensors and sampling have it.
 /// A housing known to hundredths of a kelvin would take it for copper that warms otherwise, and so for another R1.

@@ -4,7 +4,9 @@
 // sensitivities along. Cost: linear in the number of bins; no heap.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "identify/bins.hpp"
 #include "identify/dual.hpp"
@@ -34,21 +36,39 @@ Dual<N> rising(double time_s, const Dual<N>& from_s, double width_s) {
   return Dual<N>::chain(from_s, s, -s * (1 - s) / width_s);
 }
 
-/// Drive d at a place between bins and its slope per bin, for clocks that are apart: a quadratic spline, so that the
-/// slope has no jump at which a fit would stick. It spreads a step over one bin more.
-struct Moved {
-  double value, slope;
-};
-inline Moved moved(const Bins& log, double place, int d) {
-  const auto last = static_cast<double>(log.bins.size() - 1);
-  const double nearest = std::round(place), f = place - nearest;
-  const auto at = [&](double i) {
-    return log.bins[static_cast<std::size_t>(i < 0 ? 0 : i > last ? last : i)].input.drive[d];
+/// A drive between bins, for clocks that are apart: the quadratic spline through the bins' values. It has a slope
+/// everywhere (at a jump of it a fit would stick), and where it is not moved it changes nothing.
+class Spline {
+ public:
+  Spline() = default;
+  /// Knots c with c[i-1] + 6 c[i] + c[i+1] = 8 values, ends repeated; by elimination.
+  Spline(const Bins& log, int drive) : knots_(log.bins.size()) {
+    const std::size_t n = knots_.size();
+    std::vector<double> next(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double before = i > 0 ? next[i - 1] : 0, own = (i > 0 && i + 1 < n ? 6.0 : 7.0) - before;
+      next[i] = 1 / own;
+      knots_[i] = (8 * log.bins[i].input.drive[drive] - (i > 0 ? knots_[i - 1] : 0)) / own;
+    }
+    for (std::size_t i = n - 1; i-- > 0;) knots_[i] -= next[i] * knots_[i + 1];
+  }
+
+  struct Value {
+    double value, slope;  // slope: a bin
   };
-  const double before = at(nearest - 1), here = at(nearest), after = at(nearest + 1);
-  return {0.5 * (0.5 - f) * (0.5 - f) * before + (0.75 - f * f) * here + 0.5 * (0.5 + f) * (0.5 + f) * after,
-          -(0.5 - f) * before - 2 * f * here + (0.5 + f) * after};
-}
+  Value at(double place) const {
+    const auto last = static_cast<double>(knots_.size() - 1);
+    const double nearest = std::round(place), f = place - nearest;
+    const auto knot = [&](double i) { return knots_[static_cast<std::size_t>(i < 0 ? 0 : i > last ? last : i)]; };
+    const double before = knot(nearest - 1), here = knot(nearest), after = knot(nearest + 1);
+    return {0.5 * (0.5 - f) * (0.5 - f) * before + (0.75 - f * f) * here + 0.5 * (0.5 + f) * (0.5 + f) * after,
+            -(0.5 - f) * before - 2 * f * here + (0.5 + f) * after};
+  }
+
+ private:
+  std::vector<double> knots_;
+};
+using Splines = std::array<Spline, thermal::drive_count>;
 
 // A conductance that changes at a moment is written as two sources, since the links of a set are constant: with
 // d = share of the change in force and q = conductance * (factor - 1),
@@ -70,7 +90,7 @@ thermal::HeatSet<S> with_cooling_change(const Model<S>& model) {
 
 /// The inputs of bin k as the model believes them.
 template <class S>
-void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::HeatInput<S>& in) {
+void correct(const Model<S>& model, const Bins& log, const Splines& splines, std::size_t k, thermal::HeatInput<S>& in) {
   const Bin& bin = log.bins[k];
   const double h = log.width_s, time_s = (static_cast<double>(k) + 0.5) * h;
   for (int b = 0; b < thermal::boundary_count; ++b) in.boundary_degC[b] = S(bin.input.boundary_degC[b]);
@@ -81,8 +101,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
       in[d] = S(bin.input[d]);
       return;
     }
-    const Moved m = moved(log, place, static_cast<int>(d));
-    in[d] = (model.delay_s - value_of(model.delay_s)) * (-m.slope / h) + m.value;
+    const Spline::Value there = splines[static_cast<std::size_t>(d)].at(place);
+    in[d] = (model.delay_s - value_of(model.delay_s)) * (-there.slope / h) + there.value;
   };
   for (int s = 0; s < model.set.source_count; ++s) take(model.set.sources[s].drive);
   take(Drive::speed_to_0_8);
@@ -91,7 +111,12 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
         model.current_offset_A * (2 * bin.signed_A) + model.current_offset_A * model.current_offset_A;
   if (model.uneven_per_A2 != 0) in[Drive::current_A2] += model.uneven_per_A2 * bin.uneven_A4;
   const double a2 = bin.input[Drive::current_A2];
-  if (model.stalls && a2 > 0) in[Drive::current_A2] *= model.stall_share * (bin.stalled_A2 / a2) + 1.0;
+  if (model.stalls && a2 > 0) {
+    // What phases that warm unequally take more goes by the square of what heats them.
+    const S more = model.stall_share * (bin.stalled_A2 / a2) + 1.0;
+    in[Drive::current_A2] =
+        more * (in[Drive::current_A2] + (more - 1.0) * (model.uneven_per_A2 + log.uneven_per_A2) * bin.uneven_A4);
+  }
   if (model.drifts) {
     in[Boundary::ambient] += model.drift_K_per_s * time_s;
     in[Boundary::coolant] += model.drift_K_per_s * time_s;
@@ -107,8 +132,8 @@ void correct(const Model<S>& model, const Bins& log, std::size_t k, thermal::Hea
 // of the time.
 template <class S, int n, class Visit>
 HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>& network,
-                         const thermal::Transition<S, n>& transition, const Bins& log, const S& core_degC,
-                         const S& housing_degC, Visit&& visit) {
+                         const thermal::Transition<S, n>& transition, const Bins& log, const Splines& splines,
+                         const S& core_degC, const S& housing_degC, Visit&& visit) {
   using Vector = typename thermal::HeatNetwork<S, n>::Vector;
   const auto& set = model.set;
   const bool corrected = model.offset || model.delayed || model.drifts || model.stalls || model.cooling_changes ||
@@ -136,7 +161,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   for (std::size_t k = 0; k < log.bins.size(); ++k) {
     const Bin& bin = log.bins[k];
     if (corrected) {
-      correct(model, log, k, in);
+      correct(model, log, splines, k, in);
       next = network.step(transition, T, in);
     } else {
       next = network.step(transition, T, bin.input);
@@ -178,7 +203,13 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
 template <int n, class S, class Visit>
 void prepare_and_run(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC, Visit&& visit) {
   const thermal::HeatNetwork<S, n> network(with_cooling_change(model));
-  run(model, network, network.transition(log.width_s), log, core_degC, housing_degC, visit);
+  Splines splines;
+  if (model.delayed) {
+    const auto prepare = [&](Drive d) { splines[static_cast<std::size_t>(d)] = Spline(log, static_cast<int>(d)); };
+    for (int s = 0; s < model.set.source_count; ++s) prepare(model.set.sources[s].drive);
+    prepare(Drive::speed_to_0_8);
+  }
+  run(model, network, network.transition(log.width_s), log, splines, core_degC, housing_degC, visit);
 }
 
 }  // namespace replay_detail

@@ -286,13 +286,22 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
     if (anew.x.size() > 0 && (looks[i].x.size() == 0 || hoped(anew) < hoped(looks[i]))) looks[i] = std::move(anew);
   });
   std::erase_if(looks, [](const Fit& f) { return f.x.size() == 0; });
-  std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
+  const auto order = [&] {
+    std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
+  };
+  order();
+  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  if (shorter) {  // a fit to the end is cheap there, and leaves less to finish here
+    looks.resize(std::min(most_finished, looks.size()));
+    in_parallel(looks.size(), [&](std::size_t i) { looks[i] = fit(rough, looks[i].chosen, {&looks[i]}); });
+    order();
+  }
 
   // What all bins surprise more than the rough ones.
   const double more = leader.surprise() - fit(rough, leader.chosen, {&leader}, 0).surprise();
   double best = 1e300;
   const auto worth_it = [&](std::size_t i) {
-    const double errs = std::max(look_errs, look_errs_share * (base.fit.surprise() - best));
+    const double errs = shorter ? look_errs : std::max(look_errs, look_errs_share * (base.fit.surprise() - best));
     return i < std::min(most_finished, looks.size()) && (i == 0 || hoped(looks[i]) + more <= best + errs);
   };
   std::vector<Candidate> out;
@@ -449,8 +458,8 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
   sort(sets);
 }
 
-/// Every cause alone, more than once: the best of a round shows how noisy the readings are, and with that all are
-/// fitted again.
+/// Every cause alone, more than once: the best of a round shows what motor it is, which leeway goes by, and how noisy
+/// the readings are, and with that all are fitted again.
 void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all, const Margins& margins, Field& field,
                                 Search& out) {
   fit_alone(problem, all, field);
@@ -458,6 +467,7 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
   const auto best = [&]() -> const Fit& {
     return field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
   };
+  if (field.singles.front().gain > margins.detect) problem.leeway = ordinary_leeway(problem, best());
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
   refine_housing_noise(problem, best());
   if (sparse_core) refine_core_noise(problem, best());

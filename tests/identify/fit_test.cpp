@@ -181,7 +181,7 @@ TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorThatLastsIs) {
   }
   EXPECT_LE(of_noise, 1);  // eight a log, where single readings were held against a threshold
 
-  Problem problem = problem_from(as_assumed(1));
+  Problem problem = problem_from(as_assumed(2));
   const Fit f = identify::fit(problem, {});
   const double width_s = problem.logs[0].width_s;
   for (identify::Bin& bin : problem.logs[0].bins) {

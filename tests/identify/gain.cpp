@@ -31,11 +31,16 @@ struct Push {
   bool kept() const { return overshoot_K <= most_overshoot_K && share >= least_share; }
 };
 
+struct Known {
+  double off, by;  // shares of the value: from the true one; standard error
+};
+
 struct Case {
   std::uint64_t seed;
   std::string truth, answer;
   bool misnamed;  // told what it is, and the truth is not in it; or, with nothing hidden, anything but adequate
   Push before, after;
+  Known R1, C1;  // of the model found
 };
 
 /// Impulse of the push and how far the true winding passes its limit.
@@ -67,12 +72,18 @@ Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::st
     const Trace trace = push(motor, Limiter::governor, model);
     return Push{std::max(0.0, trace.hottest_true_degC - limit_degC), trace.impulse_As / best_As};
   };
+  const auto& found = report.extended.empty() ? report.baseline : report.extended;
+  const auto known = [&](std::size_t i, double truth) {
+    return Known{found[i].value / truth - 1, found[i].std_error / found[i].value};
+  };
   Case c{.seed = seed,
          .truth = clean ? "nothing" : nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
          .answer = report.verdict,
          .misnamed = clean ? report.verdict != "adequate" : report.verdict.ends_with("explained"),
          .before = outcome(before),
-         .after = outcome(after)};
+         .after = outcome(after),
+         .R1 = known(0, motor.motor.R1_K_per_W),
+         .C1 = known(2, motor.motor.C1_J_per_K)};
   for (const auto& cause : report.causes) {
     c.answer += " " + cause.id;
     c.misnamed = c.misnamed && cause.id != c.truth;
@@ -116,10 +127,14 @@ int main(int argc, char** argv) {
                     {"truth", c.truth},
                     {"answer", c.answer},
                     {"overshoot_K", {c.before.overshoot_K, c.after.overshoot_K}},
-                    {"share_of_burst", {c.before.share, c.after.share}}});
-    fmt::print(stderr, "{:>3}/{} seed {:<8} {:<22} overshoot {:5.1f} -> {:5.1f} K, burst {:5.3f} -> {:5.3f}{}  {}\n",
+                    {"share_of_burst", {c.before.share, c.after.share}},
+                    {"R1_off_and_known_by", {c.R1.off, c.R1.by}},
+                    {"C1_off_and_known_by", {c.C1.off, c.C1.by}}});
+    fmt::print(stderr,
+               "{:>3}/{} seed {:<8} {:<22} overshoot {:5.1f} -> {:5.1f} K, burst {:5.3f} -> {:5.3f}{}  {} (R1 {:+.0f} "
+               "+- {:.0f} %, C1 {:+.0f} +- {:.0f} %)\n",
                s + 1, seeds, c.seed, c.truth, c.before.overshoot_K, c.after.overshoot_K, c.before.share, c.after.share,
-               c.after.kept() ? "" : " MISSED", c.answer);
+               c.after.kept() ? "" : " MISSED", c.answer, 100 * c.R1.off, 100 * c.R1.by, 100 * c.C1.off, 100 * c.C1.by);
   }
   std::filesystem::remove_all(folder);
   if (json)
