@@ -159,9 +159,9 @@ TEST(Fit, WithHiddenHeatTheResidualIsNotWhiteAndTheStretchIsFound) {
   EXPECT_TRUE(hit);
 }
 
-Fit with_lag(const Fit& base, double lag_s) {
+Fit with_lag(const Fit& base, double lag_s, const char* cause = "sensor_lag") {
   Fit late = base;
-  late.chosen = {{identify::cause_named("sensor_lag"), -1}};
+  late.chosen = {{identify::cause_named(cause), -1}};
   late.x.resize(base.x.size() + 1);
   late.x << base.x.head(identify::base_count), lag_s, base.x.tail(base.x.size() - identify::base_count);
   return late;
@@ -201,6 +201,20 @@ TEST(Fit, ALagOfNothingChangesNothing) {
   const auto a = identify::replayed(problem, base, 0), b = identify::replayed(problem, with_lag(base, 0), 0);
   for (std::size_t k = 0; k < a.housing_degC.size(); ++k)
     ASSERT_NEAR(a.housing_degC[k], b.housing_degC[k], 0.02) << "bin " << k;  // K: 20 ms at 1 K/s
+}
+
+TEST(Fit, ADelayOfNothingChangesNothingAndOneOfAWholeBinMovesByOneBin) {
+  const Problem problem = problem_from(off_sheet(9));
+  const Fit base = identify::fit(problem, {});
+  const double bin_s = problem.logs[0].width_s;
+  const auto plain = identify::replayed(problem, base, 0),
+             still = identify::replayed(problem, with_lag(base, 0, "clock_delay"), 0),
+             later = identify::replayed(problem, with_lag(base, bin_s, "clock_delay"), 0);
+  for (std::size_t k = 1; k < plain.housing_degC.size(); ++k) {
+    ASSERT_NEAR(still.housing_degC[k], plain.housing_degC[k], 1e-6) << "bin " << k;
+    ASSERT_NEAR(still.core_degC[k], plain.core_degC[k], 1e-6) << "bin " << k;
+    ASSERT_NEAR(later.housing_degC[k], plain.housing_degC[k - 1], 0.05) << "bin " << k;
+  }
 }
 
 TEST(Fit, LeewayAveragesOverALagOfSecondsAndNotOverOneOfHalfAMinute) {
