@@ -6,7 +6,6 @@
 #include <new>
 
 #include "thermal/indices.hpp"
-#include "thermal/losses.hpp"
 #include "thermal/validate.hpp"
 
 namespace firmware {
@@ -299,29 +298,31 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
 
 /// Squared current that the samples of the last step did not show, from the last of them. The winding is taken as warm
 /// as the hottest phase is believed to be.
-float Axis::unseen_A2() const {
+thermal::Unseen Axis::unseen_now() const {
   const float warm_K = static_cast<float>(core_.estimate().hottest_degC()) - 25.0f;
   const float phase_ohm = phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
   const float turn_rad = rotor_.electrical_rad_per_s() * period_s_;
-  return thermal::unseen_A2(trace_.ended, trace_.phase_A,
-                            {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s}) +
-         thermal::turning_A2(trace_.current_A.d, trace_.current_A.q, flux_Wb_, turn_rad, inductance_H_);
+  const thermal::Unseen switching = thermal::unseen(
+      trace_.ended, trace_.phase_A, {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
+  const thermal::Unseen turning =
+      thermal::unseen_turning(trace_.current_A.d, trace_.current_A.q, flux_Wb_, turn_rad, inductance_H_);
+  return {switching.of_mean_A2 + turning.of_mean_A2, switching.of_heat_A2 + turning.of_heat_A2};
 }
 
 /// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
 /// on before, as long as the bridge is on.
-thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
+thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
   } else {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
-    const float more_A2 = mode_ == Mode::running ? unseen_A2() : 0.0f;
+    unseen_ = mode_ == Mode::running ? unseen_now() : thermal::Unseen{};
     const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
     double sampled_A2 = 0.0, vector_A2 = 0.0;
     for (int k = 0; k < 3; ++k) {
-      const float phase = phase_A2[k] + 0.5f * more_A2;
+      const float phase = phase_A2[k] + 0.5f * unseen_.of_heat_A2;
       const double one_A2 =
           static_cast<double>(phase < 0.0f ? 0.0f : phase);  // NaN stays, and is replaced by something hot
       input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;
@@ -329,7 +330,8 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) const {
       vector_A2 += one_A2 / 1.5;
     }
     input[thermal::Drive::current_A2] = vector_A2;
-    input[thermal::Drive::current_A] = std::sqrt(sampled_A2);
+    const double mean_A2 = sampled_A2 + static_cast<double>(unseen_.of_mean_A2);
+    input[thermal::Drive::current_A] = std::sqrt(mean_A2 < 0.0 ? 0.0 : mean_A2);
     input[thermal::Drive::enabled] = static_cast<double>(enabled);
     thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }
@@ -382,6 +384,7 @@ void Axis::publish() {
   }
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];
   state.housing_degC = static_cast<float>(now.housing_degC);
+  state.unseen = unseen_;
   state.heating_A = static_cast<float>(thermal::direct_A(std::sqrt(input_[thermal::Drive::current_A2])));
   state.allowance_A = allowance_.current_A;
   state.limit = state.fast.limit;

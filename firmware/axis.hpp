@@ -32,6 +32,7 @@
 #include "hal/board_port.hpp"
 #include "thermal/core_estimator.hpp"
 #include "thermal/governor.hpp"
+#include "thermal/losses.hpp"
 #include "wire/codes.hpp"
 #include "wire/protocol.hpp"
 
@@ -70,6 +71,7 @@ struct AxisState {
   float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
   float core_sigma_K = 0.0f;              // of the hottest
   float housing_degC = 0.0f;              // estimated
+  thermal::Unseen unseen{};               // of the last 10 ms: what their samples did not show
   float heating_A = 0.0f;                 // direct, through two terminals: heats as the phases did, ripple included
   float allowance_A = 0.0f;               // amplitude, the smallest of core, board and what blindness leaves
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
@@ -174,8 +176,8 @@ class Axis {
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
   void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
-  thermal::HeatInput<> heat_input(const HeatSums& sums) const;
-  float unseen_A2() const;
+  thermal::HeatInput<> heat_input(const HeatSums& sums);
+  thermal::Unseen unseen_now() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
   void change(Event event) { mode_ = next(mode_, event); }
@@ -235,6 +237,7 @@ class Axis {
   // Slow lane, in the order of the walk.
   thermal::CoreEstimator core_;
   thermal::Governor governor_;
+  thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
   float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,

@@ -12,14 +12,19 @@
 
 namespace thermal {
 
-/// What unseen_A2 must know of the bridge and the winding.
+/// What unseen() must know of the bridge and the winding.
 struct Switching {
   float bus_V, phase_ohm, inductance_H, pwm_Hz;  // the winding per phase (star), as warm as it is
   float dead_time_s;
 };
 
-/// Mean square of the current vector over a PWM period, less the square of its sample, A^2: to be added to what samples
-/// say (half of it to each phase's A^2). May be negative.
+/// What the square of a sample, A^2, must be added to say: of the current vector the square of its mean over a PWM
+/// period, which torque goes by, and the mean of its square, which heats (half of it to each phase's A^2). May be
+/// negative.
+struct Unseen {
+  float of_mean_A2, of_heat_A2;
+};
+
 ///
 /// Current is sampled in the middle of the zero vector, where the ripple is zero, so that no sample shows it. Over half
 /// a centre-aligned period the voltage runs 000, one phase on, two phases on, 111, and the ripple is four straight
@@ -29,7 +34,7 @@ struct Switching {
 /// where it flows in, so that the middle comes half of it, or all, after the sample. Where L/R is much longer than a
 /// period only the ripple counts; of the paper's motor (60 us) the rest is up to 8 % of the heat.
 ///   duty  on-time ratios 0..1 of the period that ends with the sample      sample_A  phase currents
-inline float unseen_A2(const wire::Abc& duty, const wire::Abc& sample_A, const Switching& by) {
+inline Unseen unseen(const wire::Abc& duty, const wire::Abc& sample_A, const Switching& by) {
   const float ratio[3] = {duty.a, duty.b, duty.c}, current_A[3] = {sample_A.a, sample_A.b, sample_A.c};
   int high = 0, low = 2;
   for (int k = 1; k < 3; ++k) high = ratio[k] > ratio[high] ? k : high;
@@ -43,7 +48,7 @@ inline float unseen_A2(const wire::Abc& duty, const wire::Abc& sample_A, const S
   const float unit_A = by.bus_V / (2.0f * by.inductance_H * by.pwm_Hz);
   const float decay = by.phase_ohm / (by.inductance_H * by.pwm_Hz);  // a period in time constants
   const float half_dead = by.dead_time_s * by.pwm_Hz;                // half the dead time in parts of half a period
-  float sum_A2 = 0.0f;
+  float mean_A2 = 0.0f, ripple_A2 = 0.0f;
   for (int k = 0; k < 3; ++k) {
     const float error = ratio[k] - mean;
     const float first = k == high ? 2.0f / 3.0f : -1.0f / 3.0f, last = k == low ? -2.0f / 3.0f : 1.0f / 3.0f;
@@ -58,19 +63,22 @@ inline float unseen_A2(const wire::Abc& duty, const wire::Abc& sample_A, const S
     const float edge_A = unit_A * (k == high ? begin : k == low ? corner[3] : end);
     const float delays = (current_A[k] + edge_A > 0.0f ? 1.0f : 0.0f) + (current_A[k] - edge_A < 0.0f ? 1.0f : 0.0f);
     const float missed_A = unit_A * (0.5f * decay * moment - error * delays * half_dead);
-    sum_A2 += missed_A * (2.0f * current_A[k] + missed_A) + unit_A * unit_A * square;
+    mean_A2 += missed_A * (2.0f * current_A[k] + missed_A);
+    ripple_A2 += unit_A * unit_A * square;
   }
-  return sum_A2 * (2.0f / 3.0f);  // a vector's square is 2/3 of its phases'
+  return {mean_A2 * (2.0f / 3.0f), (mean_A2 + ripple_A2) * (2.0f / 3.0f)};  // a vector's square is 2/3 of its phases'
 }
 
-/// The same of a rotor that turns by `turn_rad` (electrical) in a period, A^2: added to unseen_A2; may be negative.
+/// The same of a rotor that turns by `turn_rad` (electrical) in a period, on top.
 ///
 /// The bridge's voltage stands still for a period. So the current runs along a chord between two samples, and the
 /// magnet's flux, on its arc, pushes it off by flux turn^2 / 8 L in the middle: two thirds of that in the mean, against
 /// d.
-inline float turning_A2(float d_A, float q_A, float flux_Wb, float turn_rad, float inductance_H) {
+inline Unseen unseen_turning(float d_A, float q_A, float flux_Wb, float turn_rad, float inductance_H) {
   const float turn2 = turn_rad * turn_rad, bow_A = flux_Wb * turn2 / (8.0f * inductance_H);
-  return bow_A * (bow_A * (8.0f / 15.0f) - d_A * (4.0f / 3.0f)) - (d_A * d_A + q_A * q_A) * turn2 * (1.0f / 6.0f);
+  const float along_A2 = -bow_A * d_A * (4.0f / 3.0f), chord_A2 = (d_A * d_A + q_A * q_A) * turn2;
+  return {along_A2 + bow_A * bow_A * (4.0f / 9.0f) - chord_A2 * (1.0f / 4.0f),
+          along_A2 + bow_A * bow_A * (8.0f / 15.0f) - chord_A2 * (1.0f / 6.0f)};
 }
 
 /// Heat of the winding from the bus (eq. 5 as corrected), W: (d Vi - Ke w) Ii / d, never below zero, so that braking

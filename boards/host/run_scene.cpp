@@ -67,12 +67,11 @@ class Wish {
 /// Means over one log interval.
 class Sums {
  public:
-  /// `heat`: as the slow lane last believed it, with what samples do not show.
-  void add(const firmware::FastView& fast, const thermal::HeatInput<>& heat, const host_sim::AxisTruth& truth) {
-    const double sampled_A = heat[thermal::Drive::current_A];
-    square_A2_ += heat[thermal::Drive::current_A2] - sampled_A * sampled_A;
-    square_A2_ += static_cast<double>(fast.current_A.d * fast.current_A.d + fast.current_A.q * fast.current_A.q);
-    torque_current_A_ += static_cast<double>(fast.current_A.q);
+  /// `unseen`: of the slow lane's last 10 ms.
+  void add(const firmware::FastView& fast, const thermal::Unseen& unseen, const host_sim::AxisTruth& truth) {
+    const double d = static_cast<double>(fast.current_A.d), q = static_cast<double>(fast.current_A.q);
+    square_A2_ += d * d + q * q + static_cast<double>(unseen.of_heat_A2);
+    torque_current_A_ += std::copysign(std::sqrt(std::max(0.0, q * q + static_cast<double>(unseen.of_mean_A2))), q);
     speed_ += static_cast<double>(fast.rad_per_s);
     bus_V_ += static_cast<double>(fast.bus_V);
     torque_Nm_ += truth.torque_Nm;
@@ -296,7 +295,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
       const host_sim::AxisTruth truth = bench_.truth(trace.axis);
       const double demand = demand_A(scene_, trace.axis, time_s);
       const firmware::Axis& axis = driver_.axis(trace.axis);
-      sums[i].add(axis.fast(), axis.core().input(), truth);
+      sums[i].add(axis.fast(), axis.state().unseen, truth);
       trace.hottest_true_degC = std::max(trace.hottest_true_degC, truth.hottest_degC);
       trace.peak_shaft_W = std::max(trace.peak_shaft_W, truth.shaft_W);
       if (demand != 0) trace.impulse_As += std::hypot(truth.current_d_A, truth.current_q_A) * period_s;

@@ -11,7 +11,7 @@
 namespace {
 
 TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
-  // Held against a bridge that switches every edge; the firmware's share of the heat is what samples say and unseen_A2.
+  // Held against a bridge that switches every edge; the firmware's share of the heat is what samples say and unseen().
   double hidden = 0;
   for (const char* id : {"ec-16-40w", "ec-powermax-30-24v"}) {
     const wire::Motor sheet = plant_tests::sheet(id);
@@ -34,11 +34,12 @@ TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
                                          static_cast<float>(sheet.inductance_d_H), static_cast<float>(design.pwm_Hz),
                                          static_cast<float>(design.dead_time_s)};
           const hal::Duty duty = turning.period(q_A, 48);
-          const float turning_A2 =
-              thermal::turning_A2(0, static_cast<float>(q_A), static_cast<float>(sheet.flux_linkage_Wb),
-                                  static_cast<float>(turn_rad), by.inductance_H);
+          const thermal::Unseen by_turning =
+              thermal::unseen_turning(0, static_cast<float>(q_A), static_cast<float>(sheet.flux_linkage_Wb),
+                                      static_cast<float>(turn_rad), by.inductance_H);
           unseen_A2s +=
-              static_cast<double>(thermal::unseen_A2(duty.ratio, sample_A, by) + turning_A2) * plant_tests::period_s;
+              static_cast<double>(thermal::unseen(duty.ratio, sample_A, by).of_heat_A2 + by_turning.of_heat_A2) *
+              plant_tests::period_s;
         }
         const double true_A2s = turning.true_A2s() - before_A2s;
         // Too hot by more where ripple turns the current round at an edge: dead time then shifts a pulse only at times.

@@ -161,10 +161,10 @@ TEST(Losses, RippleAgreesWithTheSwitchedBridge) {
                              wire::Abc{0.1f, 0.1f, 0.8f}, wire::Abc{0.6f, 0.05f, 0.55f}}) {
     const double truth = switched_ripple_A2(d, 48, 30e-6, 20000);
     const thermal::Switching by{48, 0, 30e-6f, 20000, 0};  // neither resistance nor dead time: ripple alone
-    EXPECT_NEAR(static_cast<double>(thermal::unseen_A2(d, {0, 0, 0}, by)), truth, 1e-3 * truth + 1e-4);
+    EXPECT_NEAR(static_cast<double>(thermal::unseen(d, {0, 0, 0}, by).of_heat_A2), truth, 1e-3 * truth + 1e-4);
     EXPECT_GT(truth, 1.0);
   }
-  EXPECT_EQ(thermal::unseen_A2({0.5f, 0.5f, 0.5f}, {1, 0, -1}, {48, 0.5f, 30e-6f, 20000, 5e-7f}), 0.0f)
+  EXPECT_EQ(thermal::unseen({0.5f, 0.5f, 0.5f}, {1, 0, -1}, {48, 0.5f, 30e-6f, 20000, 5e-7f}).of_heat_A2, 0.0f)
       << "equal duties drive nothing";
 }
 
