@@ -136,8 +136,7 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     }
     span = std::max(span, high - low);
   }
-  // Three would fit any curve that the four parameters and two initial states can make; two dozen leave some to judge
-  // by.
+  // Four parameters and two initial temperatures follow any few readings; some must be left to judge by.
   for (const Bins& log : problem.logs) {
     float housing = 0, core = 0;
     for (const Bin& bin : log.bins) housing += bin.housing_n, core += bin.core_n;
