@@ -109,6 +109,7 @@ void Axis::take_over() {
   phase_ohm_ = p.phase_resistance_ohm;
   flux_Wb_ = p.flux_linkage_Wb;
   pwm_Hz_ = rating_.pwm_Hz;
+  soft_A_ = 2.0f * p.dead_time_soft_A;
   period_s_ = 1.0f / rating_.pwm_Hz;
   if (fault_.fault == wire::Fault::parameters) {
     fault_ = {};
@@ -302,11 +303,16 @@ thermal::Unseen Axis::unseen_now() const {
   const float warm_K = static_cast<float>(core_.estimate().hottest_degC()) - 25.0f;
   const float phase_ohm = phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
   const float turn_rad = rotor_.electrical_rad_per_s() * period_s_;
-  const thermal::Unseen switching = thermal::unseen(
-      trace_.ended, trace_.phase_A, {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
-  const thermal::Unseen turning =
-      thermal::unseen_turning(trace_.current_A.d, trace_.current_A.q, flux_Wb_, turn_rad, inductance_H_);
-  return {switching.of_mean_A2 + turning.of_mean_A2, switching.of_heat_A2 + turning.of_heat_A2};
+  const SinCos middle = sin_cos(rotor_.half_a_period_before(trace_.rotor_rad));
+  const auto phases = [&middle](Dq x) { return inverse_clarke(unpark(x, middle)); };
+  const Dq i_A = trace_.current_A;
+  const thermal::Chord chord = thermal::chord_of(turn_rad);
+  const float vector_A2 = i_A.d * i_A.d + i_A.q * i_A.q;
+  const thermal::Unseen within =
+      thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
+                      phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
+                      {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s, soft_A_});
+  return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 
 /// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
@@ -315,6 +321,7 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
+    unseen_ = {};
   } else {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;

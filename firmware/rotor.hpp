@@ -56,6 +56,11 @@ class Rotor {
     return {{electrical}, {electrical + whole(rad_per_s_ * ahead_per_speed_)}};
   }
 
+  /// Half a PWM period before it stood at mechanical_rad, within [0, 2 pi].
+  ElectricalAngle half_a_period_before(float mechanical_rad) const {
+    const float turn32 = 0.5f * rad_per_s_ * turn32_per_speed_ * electrical_per_mechanical_;
+    return {quarters_of(mechanical_rad) * pole_pairs_ - offset_ - whole(turn32)};
+  }
   const float& rad_per_s() const { return rad_per_s_; }  // mechanical
   float electrical_rad_per_s() const { return rad_per_s_ * electrical_per_mechanical_; }
 

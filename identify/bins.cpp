@@ -222,7 +222,7 @@ void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, do
   in[Drive::speed_rad_per_s] += share * w;
   in[Drive::speed2_rad2_per_s2] += share * w * w;
   in[Drive::speed3_rad3_per_s3] += share * w * w * w;
-  in[Drive::current2_speed2] += share * a2 * w * w;
+  in[Drive::current2_speed2] += share * a * a * w * w;
   in[Drive::current_speed] += share * a * w;
   in[Drive::enabled] += share * (a2 > 0 || w > 0 ? 1 : 0);
   in[Drive::speed_to_0_8] += share * (w > 0 ? std::pow(w, 0.8) : 0);

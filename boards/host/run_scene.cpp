@@ -71,7 +71,9 @@ class Sums {
   void add(const firmware::FastView& fast, const thermal::Unseen& unseen, const host_sim::AxisTruth& truth) {
     const double d = static_cast<double>(fast.current_A.d), q = static_cast<double>(fast.current_A.q);
     square_A2_ += d * d + q * q + static_cast<double>(unseen.of_heat_A2);
-    torque_current_A_ += std::copysign(std::sqrt(std::max(0.0, q * q + static_cast<double>(unseen.of_mean_A2))), q);
+    d_A_ += d;
+    q_A_ += q;
+    unseen_of_mean_A2_ += static_cast<double>(unseen.of_mean_A2);
     speed_ += static_cast<double>(fast.rad_per_s);
     bus_V_ += static_cast<double>(fast.bus_V);
     torque_Nm_ += truth.torque_Nm;
@@ -80,8 +82,9 @@ class Sums {
   }
   void write(Row& row) {
     const double n = std::max(count_, 1);
-    row.iq_A = torque_current_A_ / n;
-    row.current_A = std::copysign(root_3_over_2 * std::sqrt(std::max(0.0, square_A2_ / n)), torque_current_A_);
+    const double d_A = d_A_ / n, q_A = q_A_ / n;
+    row.iq_A = std::copysign(std::sqrt(std::max(0.0, d_A * d_A + q_A * q_A + unseen_of_mean_A2_ / n)), q_A);
+    row.current_A = std::copysign(root_3_over_2 * std::sqrt(std::max(0.0, square_A2_ / n)), q_A);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
@@ -90,7 +93,8 @@ class Sums {
   }
 
  private:
-  double torque_current_A_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
+  double d_A_ = 0, q_A_ = 0, unseen_of_mean_A2_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0,
+         shaft_W_ = 0;
   int count_ = 0;
 };
 

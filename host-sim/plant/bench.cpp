@@ -37,7 +37,7 @@ Bench::Axis::Axis(const BenchDesign& design, int index, std::uint64_t seed)
       bridge(design.bridge),
       stove(design.axes[index].heat, design.axes[index].hidden, seed),
       hidden(design.axes[index].hidden),
-      phase_ohm{} {
+      standing_ohm{} {
   motor.place(design.start_angle_rad[index], 0);
   stove.soak(design.start_degC);
   stove.around = {.ambient_degC = design.ambient_degC,
@@ -76,8 +76,12 @@ void Bench::soak(double degC) {
 
 void Bench::renew_resistance(Axis& axis) {
   const double speed_rad_per_s = std::fabs(axis.motor.speed_rad_per_s());
-  for (int k = 0; k < 3; ++k) axis.phase_ohm[k] = axis.stove.phase_ohm(k, speed_rad_per_s);
-  axis.motor.set_resistance(axis.phase_ohm, design_.bridge.on_resistance_ohm);
+  std::array<double, 3> turning_ohm;
+  for (int k = 0; k < 3; ++k) {
+    axis.standing_ohm[k] = axis.stove.phase_ohm(k, 0);
+    turning_ohm[k] = axis.stove.phase_ohm(k, speed_rad_per_s);
+  }
+  axis.motor.set_resistance(turning_ohm, design_.bridge.on_resistance_ohm);
   axis.motor.set_magnet_degC(axis.stove.magnet_degC());
 }
 
@@ -95,7 +99,7 @@ void Bench::advance_axis(int axis, const hal::Duty& duty) {
 }
 
 void Bench::move(Axis& axis, const hal::Duty& duty) {
-  axis.bridge.advance(axis.motor, duty, supply_.bus_V(), axis.phase_ohm);
+  axis.bridge.advance(axis.motor, duty, supply_.bus_V(), axis.standing_ohm);
   axis.current2_sum_A2 += axis.motor.current_squared_A2();
   axis.enabled_periods += duty.on;
 }

@@ -124,8 +124,8 @@ class Bench {
     Bridge bridge;
     Stove stove;
     HiddenEffects hidden;
-    std::array<double, 3> phase_ohm;
-    MotorWork charged_motor;  // what the stove already got
+    std::array<double, 3> standing_ohm;  // of the ripple: what turning adds is a loss of the turning field
+    MotorWork charged_motor;             // what the stove already got
     BridgeWork charged_bridge;
     double current2_sum_A2 = 0, bus_charged_J = 0;
     long enabled_periods = 0;

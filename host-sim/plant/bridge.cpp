@@ -97,7 +97,7 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
     work_.bus_J += period_s * mean_A[k] * effective[k] * bus_V;
     work_.heat_J += period_s * mean_A[k] * drop_V[k];
   }
-  if (open_phases == 0) within_the_period(motor, current_A, ratio, bus_V, winding_ohm);
+  if (open_phases == 0) within_the_period(motor, current_A, effective, bus_V, winding_ohm);
 }
 
 /// What an averaged step leaves out: the ripple; the ramp from its start to its end; and, of a motor that turns, that
@@ -105,28 +105,36 @@ void Bridge::averaged(Motor& motor, const std::array<double, 3>& ratio, double b
 /// arc, the driven flux along its chord, and the current bows by their difference: flux turn^2/8 in the middle, two
 /// thirds in the mean, and 4/45 of its square more in the mean square. Dead time delays a pulse's begin where current
 /// flows out and its end where current flows in: usually one of them, and the pulse stands half of it late, a sample
-/// half of it early.
+/// half of it early. The pulses belong to the middle of the step, a sample to its end, and what the one misses for the
+/// other goes round with the rotor.
 void Bridge::within_the_period(const Motor& motor, const std::array<double, 3>& start_A,
-                               const std::array<double, 3>& ratio, double bus_V,
+                               const std::array<double, 3>& effective, double bus_V,
                                const std::array<double, 3>& winding_ohm) {
   const double period_s = period_s_, inductance_H = motor.mean_inductance_H();
   const double unit_A = bus_V * period_s / inductance_H;
   const double mean_ohm = (winding_ohm[0] + winding_ohm[1] + winding_ohm[2]) / 3 + design_.on_resistance_ohm;
   const double droop_A = unit_A * mean_ohm * period_s / inductance_H;
-  const double early_A = unit_A * 0.5 * design_.dead_time_s * design_.pwm_Hz,
-               mean = (ratio[0] + ratio[1] + ratio[2]) / 3;
+  const double early_A = unit_A * 0.5 * design_.dead_time_s * design_.pwm_Hz;
   const double turn_rad = motor.design().pole_pairs * motor.speed_rad_per_s() * period_s;
   const std::array<double, 3> magnet_Wb = motor.magnet_Wb(), end_A = motor.current_A();
-  const RippleShare share = ripple_share(ratio);
-  double squared_A2 = 0;
+  const RippleShare share = ripple_share(effective);
+  std::array<double, 3> switching_A, bow_A;
+  double squared_A2 = 0, early_mean_A = 0;
   for (int k = 0; k < 3; ++k) {
     const double ripple_A2 = share.square[k] * unit_A * unit_A, ramp_A = end_A[k] - start_A[k];
-    const double bow_A = -magnet_Wb[k] / inductance_H * turn_rad * turn_rad / 8;
+    bow_A[k] = -magnet_Wb[k] / inductance_H * turn_rad * turn_rad / 8;
     squared_A2 += ripple_A2;
-    charge_ripple(k, (ripple_A2 + ramp_A * ramp_A / 12 + bow_A * bow_A * 4 / 45) * period_s, winding_ohm[k]);
+    charge_ripple(k, (ripple_A2 + ramp_A * ramp_A / 12 + bow_A[k] * bow_A[k] * 4 / 45) * period_s, winding_ohm[k]);
     const double edge_A = share.edge[k] * unit_A;
     const int delayed = (end_A[k] + edge_A > 0) + (end_A[k] - edge_A < 0);
-    missed_A_[k] = share.moment[k] * droop_A + bow_A * 2 / 3 - (ratio[k] - mean) * delayed * early_A;
+    const double shifted_A = effective[k] * delayed * early_A;
+    switching_A[k] = share.moment[k] * droop_A - shifted_A;
+    early_mean_A += shifted_A / 3;
+  }
+  for (double& a : switching_A) a += early_mean_A;
+  for (int k = 0; k < 3; ++k) {
+    const double across_A = (switching_A[(k + 1) % 3] - switching_A[(k + 2) % 3]) / std::sqrt(3.0);
+    missed_A_[k] = switching_A[k] * std::cos(0.5 * turn_rad) - across_A * std::sin(0.5 * turn_rad) + bow_A[k] * 2 / 3;
   }
   soft_A_ = 1e-3 + std::sqrt(squared_A2);  // peak of a triangle: sqrt(3) of its rms; squared_A2 sums three phases
 }

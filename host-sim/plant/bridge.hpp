@@ -48,7 +48,7 @@ class Bridge {
  public:
   explicit Bridge(const BridgeDesign& design) : design_(design), period_s_(1 / design.pwm_Hz) {}
 
-  /// One PWM period.
+  /// One PWM period. `winding_ohm`: what the ripple meets, phase by phase.
   void advance(Motor& motor, const hal::Duty& duty, double bus_V, const std::array<double, 3>& winding_ohm);
 
   // Faults of the wiring and of the stage; neutral by default.
@@ -71,8 +71,8 @@ class Bridge {
                 const std::array<double, 3>& winding_ohm);
   void segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V,
                const std::array<double, 3>& winding_ohm);
-  void within_the_period(const Motor& motor, const std::array<double, 3>& start_A, const std::array<double, 3>& ratio,
-                         double bus_V, const std::array<double, 3>& winding_ohm);
+  void within_the_period(const Motor& motor, const std::array<double, 3>& start_A,
+                         const std::array<double, 3>& effective, double bus_V, const std::array<double, 3>& winding_ohm);
   void charge_ripple(int phase, double squared_A2s, double winding_ohm);
   void charge_edges(const Motor& motor, const std::array<double, 3>& ratio, double bus_V);
   void carry_short(const std::array<double, 3>& ratio, double bus_V);

@@ -512,6 +512,18 @@ TEST_F(Running, RippleHeatsAndRubsNothing) {
   EXPECT_GT(heat[thermal::Drive::current_A2], 25.0 + 1.0);
 }
 
+TEST_F(Running, OnceStoppedForWantOfSamplesItShowsNoCurrent) {
+  motor.rad_per_s = 400;
+  hold({0.0f, 5.0f}, 2000);
+  run(200 - ticks % 200);  // the slow lane has just taken all samples
+  ASSERT_GT(axis().state().unseen.of_heat_A2, 0.5f);
+  for (int i = 0; i < 100; ++i) spoilt([](auto& s) { s.valid = false; });
+  ASSERT_EQ(axis().mode(), Mode::tripped);
+  for (int i = 0; i < 3; ++i) driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  EXPECT_EQ(axis().state().unseen.of_heat_A2, 0.0f);
+  EXPECT_EQ(axis().state().heating_A, 0.0f);
+}
+
 TEST_F(Running, LostTimeIsChargedHotterThanTheLastSample) {
   hold({0.0f, 5.0f}, 200 - ticks % 200 + 100);  // the middle of a slow period
   const double before_A2 = axis().current2_A2();

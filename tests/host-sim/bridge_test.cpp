@@ -79,10 +79,9 @@ TEST(Bridge, ASampleMissesOfTheHeatWhatItMissesOfItOnTheSwitchedBridge) {
   // The paper's motor: a period of 50 us beside L/R of 60 us, so that the sample in the zero vector is not the mean.
   double largest_miss = 0;
   for (const double dead_time_s : {0.0, 500e-9}) {
-    for (const double rad_per_s : {0.0, 1000.0, 3500.0}) {
-      for (const double q_A : {2.0, 6.0, 15.0}) {
-        if (q_A < 4 && dead_time_s > 0) continue;  // the ripple turns it round, and dead time errs less than assumed
-        std::array<double, 2> share{};             // of the heat, that the square of the samples is
+    for (const double rad_per_s : {0.0, 1000.0, 2000.0, 3500.0}) {
+      for (const double q_A : {1.0, 2.0, 4.0, 6.0, 15.0}) {
+        std::array<double, 2> share{};  // of the heat, that the square of the samples is
         for (const bool switched : {false, true}) {
           BridgeDesign design;
           design.dead_time_s = dead_time_s;
@@ -98,7 +97,10 @@ TEST(Bridge, ASampleMissesOfTheHeatWhatItMissesOfItOnTheSwitchedBridge) {
           }
           share[switched] = sampled_A2s / (turning.true_A2s() - before_A2s);
         }
-        EXPECT_NEAR(share[0], share[1], dead_time_s > 0 ? 0.006 : 0.004)
+        // Where ripple turns the current round at an edge, dead time acts at times: the averaged bridge knows how far,
+        // not when.
+        const bool turned_round = dead_time_s > 0 && rad_per_s > 1500 && q_A < 5;
+        EXPECT_NEAR(share[0], share[1], turned_round ? 0.015 : 0.003)
             << dead_time_s << " s, " << rad_per_s << " rad/s, " << q_A << " A";
         largest_miss = std::max(largest_miss, 1 - share[1]);
       }

@@ -43,13 +43,28 @@ class Turning {
 
   std::array<double, 3> sampled_A() const { return bridge_.sampled_A(motor_); }
 
+  struct Dq {
+    double d, q;
+  };
+  Dq sampled_dq() const {
+    const std::array<double, 3> a = sampled_A();
+    const double alpha = a[0], beta = (a[1] - a[2]) / std::sqrt(3.0), angle_rad = electrical_rad();
+    return {alpha * std::cos(angle_rad) + beta * std::sin(angle_rad),
+            beta * std::cos(angle_rad) - alpha * std::sin(angle_rad)};
+  }
+
+  /// A vector that stands still for the rotor, in the middle of the coming period.
+  wire::Abc phases_in_the_middle(double d, double q) const {
+    const double middle_rad = electrical_rad() + 0.5 * period_s * motor_.design().pole_pairs * motor_.speed_rad_per_s();
+    const auto phase = [&](double shift_rad) {
+      return static_cast<float>(d * std::cos(middle_rad - shift_rad) - q * std::sin(middle_rad - shift_rad));
+    };
+    return {phase(0), phase(2 * host_sim::pi / 3), phase(-2 * host_sim::pi / 3)};
+  }
+
   /// One period at `bus_V` towards d = 0, q = `q_A`: the duty that it ran with.
   hal::Duty period(double q_A, double bus_V) {
-    const std::array<double, 3> a = sampled_A();
-    const double alpha_A = a[0], beta_A = (a[1] - a[2]) / std::sqrt(3.0);
-    const double angle_rad = motor_.design().pole_pairs * motor_.angle_rad();
-    const double d = alpha_A * std::cos(angle_rad) + beta_A * std::sin(angle_rad),
-                 q = beta_A * std::cos(angle_rad) - alpha_A * std::sin(angle_rad);
+    const auto [d, q] = sampled_dq();
     d_V_ -= 0.01 * d, q_V_ += 0.01 * (q_A - q);
     const double emf_V = motor_.design().pole_pairs * motor_.speed_rad_per_s() * motor_.flux_linkage_Wb();
     const hal::Duty duty = vector_duty(motor_, d_V_ - 0.1 * d, emf_V + q_V_ + 0.1 * (q_A - q), bus_V);
@@ -65,6 +80,8 @@ class Turning {
   }
 
  private:
+  double electrical_rad() const { return motor_.design().pole_pairs * motor_.angle_rad(); }
+
   host_sim::Motor motor_;
   host_sim::Bridge bridge_;
   std::array<double, 3> phase_ohm_;
