@@ -109,7 +109,6 @@ void Axis::take_over() {
   phase_ohm_ = p.phase_resistance_ohm;
   flux_Wb_ = p.flux_linkage_Wb;
   pwm_Hz_ = rating_.pwm_Hz;
-  soft_A_ = 2.0f * p.dead_time_soft_A;
   period_s_ = 1.0f / rating_.pwm_Hz;
   if (fault_.fault == wire::Fault::parameters) {
     fault_ = {};
@@ -311,7 +310,7 @@ thermal::Unseen Axis::unseen_now() const {
   const thermal::Unseen within =
       thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
                       phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
-                      {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s, soft_A_});
+                      {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
   return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 

@@ -239,7 +239,7 @@ class Axis {
   thermal::Governor governor_;
   thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
-  float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f, soft_A_ = 0.0f;
+  float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;

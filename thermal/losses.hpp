@@ -16,7 +16,6 @@ namespace thermal {
 struct Switching {
   float bus_V, phase_ohm, inductance_H, pwm_Hz;  // the winding per phase (star), as warm as it is
   float dead_time_s;
-  float soft_A;  // below it a phase's current, noisy, does not tell which way dead time acts
 };
 
 /// What the square of a sample, A^2, must be added to say: of the current vector the square of its mean over a PWM
@@ -83,13 +82,16 @@ inline Unseen unseen(const wire::Abc& duty, const wire::Abc& middle_A, const wir
   const float dead = by.dead_time_s * by.pwm_Hz;                     // of a period; half of it, of half a period
 
   float ratio[3] = {duty.a, duty.b, duty.c}, late[3], mean_late = 0.0f;
+  // Where all pulses have their edges together, dead time ends currents of this size: up to half of it, the sign of a
+  // noisy sample does not say which way dead time acts.
+  const float unknown_A = unit_A * dead;
   const Ripple asked = ripple_of(ratio);
   for (int k = 0; k < 3; ++k) {
     const float begin_A = unit_A * asked.begin[k];
-    const float begins_late = share_above(current_A[k] + begin_A, by.soft_A);
-    const float ends_late = share_above(begin_A - current_A[k], by.soft_A);
+    const float begins_late = share_above(current_A[k] + begin_A, unknown_A);
+    const float ends_late = share_above(begin_A - current_A[k], unknown_A);
     // What ripple turns round at an edge is narrowed or widened at times.
-    const float soft_A = std::fmax(by.soft_A, std::fabs(begin_A));
+    const float soft_A = std::fmax(unknown_A, std::fabs(begin_A));
     ratio[k] += dead * (1.0f - 2.0f * share_above(current_A[k], soft_A));
     late[k] = ratio[k] * dead * (ends_late + begins_late);
     mean_late += late[k] * (1.0f / 3.0f);

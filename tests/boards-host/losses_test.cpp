@@ -31,12 +31,9 @@ TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
           const double vector_A2 = sample_d_A * sample_d_A + sample_q_A * sample_q_A;
           const thermal::Chord chord = thermal::chord_of(static_cast<float>(turn_rad));
           const double along = static_cast<double>(chord.middle);
-          const thermal::Switching by = {48,
-                                         static_cast<float>(sheet.phase_resistance_ohm),
-                                         static_cast<float>(sheet.inductance_d_H),
-                                         static_cast<float>(design.pwm_Hz),
-                                         static_cast<float>(design.dead_time_s),
-                                         0.2f};
+          const thermal::Switching by = {48, static_cast<float>(sheet.phase_resistance_ohm),
+                                         static_cast<float>(sheet.inductance_d_H), static_cast<float>(design.pwm_Hz),
+                                         static_cast<float>(design.dead_time_s)};
           const float bow_A =
               thermal::bow_of(static_cast<float>(turn_rad), static_cast<float>(sheet.flux_linkage_Wb), by.inductance_H);
           const wire::Abc middle_A = turning.phases_in_the_middle(along * sample_d_A, along * sample_q_A),

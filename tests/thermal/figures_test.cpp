@@ -160,12 +160,12 @@ TEST(Losses, RippleAgreesWithTheSwitchedBridge) {
   for (const wire::Abc& d : {wire::Abc{0.7f, 0.5f, 0.3f}, wire::Abc{0.2f, 0.9f, 0.4f}, wire::Abc{0.45f, 0.5f, 0.95f},
                              wire::Abc{0.1f, 0.1f, 0.8f}, wire::Abc{0.6f, 0.05f, 0.55f}}) {
     const double truth = switched_ripple_A2(d, 48, 30e-6, 20000);
-    const thermal::Switching by{48, 0, 30e-6f, 20000, 0, 0};  // neither resistance nor dead time: ripple alone
+    const thermal::Switching by{48, 0, 30e-6f, 20000, 0};  // neither resistance nor dead time: ripple alone
     EXPECT_NEAR(static_cast<double>(thermal::unseen(d, {0, 0, 0}, {0, 0, 0}, by).of_heat_A2), truth,
                 1e-3 * truth + 1e-4);
     EXPECT_GT(truth, 1.0);
   }
-  const thermal::Switching real{48, 0.5f, 30e-6f, 20000, 5e-7f, 0.2f};
+  const thermal::Switching real{48, 0.5f, 30e-6f, 20000, 5e-7f};
   EXPECT_EQ(thermal::unseen({0.5f, 0.5f, 0.5f}, {0, 0, 0}, {0, 0, 0}, real).of_heat_A2, 0.0f)
       << "equal duties drive nothing";
   EXPECT_LT(thermal::unseen({0.5f, 0.5f, 0.5f}, {0.03f, -0.03f, 0}, {0, 0, 0}, real).of_heat_A2, 0.01f)
