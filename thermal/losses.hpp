@@ -82,17 +82,17 @@ inline Unseen unseen(const wire::Abc& duty, const wire::Abc& middle_A, const wir
   const float dead = by.dead_time_s * by.pwm_Hz;                     // of a period; half of it, of half a period
 
   float ratio[3] = {duty.a, duty.b, duty.c}, late[3], mean_late = 0.0f;
-  // Where all pulses have their edges together, dead time ends currents of this size: up to half of it, the sign of a
-  // noisy sample does not say which way dead time acts.
-  const float unknown_A = unit_A * dead;
+  // Where all pulses have their edges together, dead time turns currents of this size either way.
+  const float unknown_A = 0.5f * unit_A * dead;
   const Ripple asked = ripple_of(ratio);
   for (int k = 0; k < 3; ++k) {
     const float begin_A = unit_A * asked.begin[k];
-    const float begins_late = share_above(current_A[k] + begin_A, unknown_A);
-    const float ends_late = share_above(begin_A - current_A[k], unknown_A);
+    const float mean_A = current_A[k] + unit_A * 0.5f * decay * asked.moment[k] + bent_A[k] * (2.0f / 3.0f);
+    const float begins_late = share_above(mean_A + begin_A, unknown_A);
+    const float ends_late = share_above(begin_A - mean_A, unknown_A);
     // What ripple turns round at an edge is narrowed or widened at times.
     const float soft_A = std::fmax(unknown_A, std::fabs(begin_A));
-    ratio[k] += dead * (1.0f - 2.0f * share_above(current_A[k], soft_A));
+    ratio[k] += dead * (1.0f - 2.0f * share_above(mean_A, soft_A));
     late[k] = ratio[k] * dead * (ends_late + begins_late);
     mean_late += late[k] * (1.0f / 3.0f);
   }

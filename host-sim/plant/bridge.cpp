@@ -117,6 +117,9 @@ void Bridge::within_the_period(const Motor& motor, const std::array<double, 3>& 
   const double early_A = unit_A * 0.5 * design_.dead_time_s * design_.pwm_Hz;
   const double turn_rad = motor.design().pole_pairs * motor.speed_rad_per_s() * period_s;
   const std::array<double, 3> magnet_Wb = motor.magnet_Wb(), end_A = motor.current_A();
+  // All pulses together, dead time turns a quarter of this and less either way.
+  const double ended_A = 2 * early_A;
+  const auto outward = [&](double a) { return std::clamp(0.5 + 2 * a / std::max(ended_A, 1e-9), 0.0, 1.0); };
   const RippleShare share = ripple_share(effective);
   std::array<double, 3> switching_A, bow_A;
   double squared_A2 = 0, early_mean_A = 0;
@@ -126,7 +129,7 @@ void Bridge::within_the_period(const Motor& motor, const std::array<double, 3>& 
     squared_A2 += ripple_A2;
     charge_ripple(k, (ripple_A2 + ramp_A * ramp_A / 12 + bow_A[k] * bow_A[k] * 4 / 45) * period_s, winding_ohm[k]);
     const double edge_A = share.edge[k] * unit_A;
-    const int delayed = (end_A[k] + edge_A > 0) + (end_A[k] - edge_A < 0);
+    const double delayed = outward(end_A[k] + edge_A) + outward(edge_A - end_A[k]);
     const double shifted_A = effective[k] * delayed * early_A;
     switching_A[k] = share.moment[k] * droop_A - shifted_A;
     early_mean_A += shifted_A / 3;
