@@ -248,6 +248,9 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   return "";
 }
 
+/// C1 over C2: in catalogues 0.6 at most (maxon, of 5 to 200 W), three times as far allowed as for a belief.
+constexpr double heaviest_winding = 1.8;
+
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
@@ -263,6 +266,15 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
           cause.parameters[0].high);
     }
     at += static_cast<Eigen::Index>(cause.parameters.size());
+  }
+  const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
+                                [](const Bins& log) { return log.has_core && log.has_housing; });
+  const Physical p = physical(found.chosen.fit.x);
+  if (both && p.C1_J_per_K > heaviest_winding * p.C2_J_per_K) {
+    return fmt::format(
+        "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
+        "housing_degC are swapped.",
+        p.C1_J_per_K / p.C2_J_per_K);
   }
   return found.base.ratio < 2 ? "" : misread_columns(problem, best, logs, motor);
 }
