@@ -74,19 +74,19 @@ std::string quantity_of(const std::string& suffix) {
   return unit ? unit->quantity : std::string();
 }
 
-void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor,
+void apply_unit(const std::string& unit, const std::string& role, const std::string& where, Exit blame, double& factor,
                 double& offset) {
   const auto known = unit_named(unit);
   if (!known)
-    throw UserError(Exit::usage,
+    throw UserError(blame,
                     fmt::format("{}: unknown unit '{}'; units: {}.", where, unit, fmt::join(unit_names(), ", ")));
   std::string wanted;
   for (std::size_t cut = role.find('_'); cut != std::string::npos && wanted.empty(); cut = role.find('_', cut + 1)) {
     wanted = quantity_of(role.substr(cut + 1));
   }
   if (!wanted.empty() && wanted != known->quantity) {
-    throw UserError(Exit::usage, fmt::format("{}: {} is a {}, but {} is a {}; map another column.", where, unit,
-                                             known->quantity, role, wanted));
+    throw UserError(blame, fmt::format("{}: {} is a {}, but {} is a {}; map another column.", where, unit,
+                                       known->quantity, role, wanted));
   }
   factor = known->factor;
   offset = known->offset;

@@ -92,7 +92,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the row of units below the header, column '{}' (--column {}={}:UNIT overrules it)",
                              table.file, source.column, own_name(role), source.column),
-                 source.factor, source.offset);
+                 Exit::unusable, source.factor, source.offset);
   }
   return found;
 }
@@ -282,7 +282,7 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   }
   Source source{rest.substr(0, colon)};
   if (colon != std::string::npos) {
-    apply_unit(rest.substr(colon + 1), own_name(role), where, source.factor, source.offset);
+    apply_unit(rest.substr(colon + 1), own_name(role), where, Exit::usage, source.factor, source.offset);
     source.unit_said = true;
   }
   map.columns[role] = source;

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "wire/pc/user_error.hpp"
+
 namespace identify {
 
 struct Unit {
@@ -20,8 +22,8 @@ std::vector<std::string> unit_names();
 std::string quantity_of(const std::string& suffix);
 
 /// Sets factor and offset for a column in `unit` that plays `role` (an own name, unit included). Throws UserError
-/// (usage), saying `where`, when the unit is unknown or measures something else.
-void apply_unit(const std::string& unit, const std::string& role, const std::string& where, double& factor,
-                double& offset);
+/// (`blame`: the command line or the log), saying `where`, when the unit is unknown or measures something else.
+void apply_unit(const std::string& unit, const std::string& role, const std::string& where, wire::pc::Exit blame,
+                double& factor, double& offset);
 
 }  // namespace identify
