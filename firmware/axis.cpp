@@ -17,6 +17,7 @@ constexpr float blind_share = 0.6f;    // of the continuous current: reaction R2
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
+constexpr float towards_hot = 1.005f;  // what samples do not show is known to a percent of the heat (losses_test)
 
 bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
 
@@ -326,9 +327,13 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
     unseen_ = mode_ == Mode::running ? unseen_now() : thermal::Unseen{};
     const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    // What a sample misses of the mean goes with the phase's own current, ripple through all of them.
+    const float all_A2 = phase_A2[0] + phase_A2[1] + phase_A2[2];
+    const float missed = all_A2 > 0.0f ? 1.5f * unseen_.of_mean_A2 / all_A2 : 0.0f;
+    const float ripple_A2 = 0.5f * (unseen_.of_heat_A2 - (all_A2 > 0.0f ? unseen_.of_mean_A2 : 0.0f));
     double sampled_A2 = 0.0, vector_A2 = 0.0;
     for (int k = 0; k < 3; ++k) {
-      const float phase = phase_A2[k] + 0.5f * unseen_.of_heat_A2;
+      const float phase = towards_hot * (phase_A2[k] * (1.0f + missed) + ripple_A2);
       const double one_A2 =
           static_cast<double>(phase < 0.0f ? 0.0f : phase);  // NaN stays, and is replaced by something hot
       input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;

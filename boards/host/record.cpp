@@ -189,8 +189,8 @@ Recording record(const RecordOptions& options) {
   std::string csv = fmt::format("# recorded by host-sim (SIMULATED): {}, motor {}{}, seed {}\n", options.excitation,
                                 file.name, file.surrogate ? " (surrogate)" : "", options.seed);
   csv += fmt::format(
-      "# current_A: direct current through two terminals that heats alike, PWM ripple included; iq_A: amplitude of "
-      "the mean current; core_degC: {}\n"
+      "# current_A: direct current through two terminals that heats alike, PWM ripple included; iq_A: its "
+      "amplitude without the ripple; core_degC: {}\n"
       "# current, speed and bus: means over the interval that begins at time_s\n",
       options.thermocouple ? "thermocouple, +-0.2 K" : "from winding resistance, +-2 K, every 30 s");
   csv += "time_s,current_A,iq_A,speed_rad_per_s,bus_V,bus_A,housing_degC,ambient_degC,core_degC\n";

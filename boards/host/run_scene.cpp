@@ -70,21 +70,24 @@ class Sums {
   /// `unseen`: of the slow lane's last 10 ms.
   void add(const firmware::FastView& fast, const thermal::Unseen& unseen, const host_sim::AxisTruth& truth) {
     const double d = static_cast<double>(fast.current_A.d), q = static_cast<double>(fast.current_A.q);
-    square_A2_ += d * d + q * q + static_cast<double>(unseen.of_heat_A2);
-    d_A_ += d;
-    q_A_ += q;
+    sampled_A2_ += d * d + q * q;
+    unseen_of_heat_A2_ += static_cast<double>(unseen.of_heat_A2);
     unseen_of_mean_A2_ += static_cast<double>(unseen.of_mean_A2);
+    q_A_ += q;
     speed_ += static_cast<double>(fast.rad_per_s);
     bus_V_ += static_cast<double>(fast.bus_V);
     torque_Nm_ += truth.torque_Nm;
     shaft_W_ += truth.shaft_W;
     ++count_;
   }
-  void write(Row& row) {
-    const double n = std::max(count_, 1);
-    const double d_A = d_A_ / n, q_A = q_A_ / n;
-    row.iq_A = std::copysign(std::sqrt(std::max(0.0, d_A * d_A + q_A * q_A + unseen_of_mean_A2_ / n)), q_A);
-    row.current_A = std::copysign(root_3_over_2 * std::sqrt(std::max(0.0, square_A2_ / n)), q_A);
+  /// `noise_A`: of one phase's samples, which is no current.
+  void write(Row& row, double noise_A) {
+    const double n = std::max(count_, 1), sampled_A2 = sampled_A2_ / n - 4.0 / 3 * noise_A * noise_A;
+    const auto amplitude_A = [&](double unseen_A2) {
+      return std::copysign(std::sqrt(std::max(0.0, sampled_A2 + unseen_A2 / n)), q_A_);
+    };
+    row.iq_A = amplitude_A(unseen_of_mean_A2_);
+    row.current_A = root_3_over_2 * amplitude_A(unseen_of_heat_A2_);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
@@ -93,8 +96,8 @@ class Sums {
   }
 
  private:
-  double d_A_ = 0, q_A_ = 0, unseen_of_mean_A2_ = 0, square_A2_ = 0, speed_ = 0, bus_V_ = 0, torque_Nm_ = 0,
-         shaft_W_ = 0;
+  double sampled_A2_ = 0, unseen_of_heat_A2_ = 0, unseen_of_mean_A2_ = 0, q_A_ = 0;
+  double speed_ = 0, bus_V_ = 0, torque_Nm_ = 0, shaft_W_ = 0;
   int count_ = 0;
 };
 
@@ -305,7 +308,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
       if (demand != 0) trace.impulse_As += std::hypot(truth.current_d_A, truth.current_q_A) * period_s;
       if ((periods_ - warm_up) % log_periods == 0) {
         Row line = row(trace.axis, time_s, demand);
-        sums[i].write(line);
+        sums[i].write(line, design_.sensors.current_noise_A);
         trace.rows.push_back(line);
       }
     }

@@ -17,7 +17,7 @@ struct Row {
   double demand_A;            // amplitude asked for
   double allowance_A;         // amplitude the firmware allowed
   double id_now_A, iq_now_A;  // at the end of the interval
-  double iq_A;       // amplitude of the mean current, signed like its torque
+  double iq_A;                // rms of the current without its ripple, signed like its torque
   double current_A;  // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM
                      // ripple that sampling cannot see, signed like iq
   double speed_rad_per_s;
