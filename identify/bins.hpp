@@ -7,7 +7,8 @@
 //
 // Current is the amplitude of the current vector: heat = 3/2 R_phase i^2. A current_A column is the direct current that
 // heats alike through two terminals, so i = 2/sqrt(3) times it (wire/motor.hpp). It holds the ripple of the pulses,
-// which makes heat and no torque: where iq_A is there too, what goes with |i| or its sign is taken from that.
+// which makes heat and no torque: where iq_A is there too, what goes with |i|, its sign or current and speed is taken
+// from that.
 #pragma once
 
 #include <cmath>

@@ -33,7 +33,7 @@ enum class Drive : std::uint8_t {
   speed_rad_per_s,  // |mechanical speed|
   speed2_rad2_per_s2,
   speed3_rad3_per_s3,
-  current2_speed2,  // |i|^2 w^2
+  current2_speed2,  // |i|^2 w^2, without the ripple: the loss of a field that turns
   current_speed,    // |i| |w|, without the ripple
   enabled,          // share of the time the bridge switched
   power_W,          // heat known from elsewhere: measured, or from bus power (sensor set B)

@@ -355,7 +355,7 @@ TEST(Bins, SquaresTakeTheCurrentWithItsRippleAndMagnitudesTheTorqueCurrent) {
   const auto& mean = bins.bins.front().input;
   EXPECT_DOUBLE_EQ(bins.width_s, 2);
   EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_A2], 25);
-  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current2_speed2], 2500);
+  EXPECT_DOUBLE_EQ(mean[thermal::Drive::current2_speed2], 650);  // (3^2 + 2^2) / 2 * 10^2
   EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_A], 2.5);
   EXPECT_DOUBLE_EQ(mean[thermal::Drive::current_speed], 25);
   EXPECT_DOUBLE_EQ(bins.bins.front().signed_A, -2.5);
