@@ -17,7 +17,7 @@ constexpr float blind_share = 0.6f;    // of the continuous current: reaction R2
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
-constexpr float towards_hot = 1.005f;  // what samples do not show is known to a percent of the heat (losses_test)
+constexpr float towards_hot = 1.005f;  // mostly, what samples do not show is known to half a percent (losses_test)
 
 bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
 

@@ -18,9 +18,9 @@ const double ordinary_uneven_share = 1 / std::sqrt(3.0);
 /// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
 /// host-sim's default motor: a standard deviation is one of these more or less.
 constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
-/// Of the heat, where the current squared is its mean over the heat: a standard deviation. From rest to top speed the
-/// current that host-sim records says -0.1 to 0.7 percent more heat than the plant's joules (duty and designed, seed
-/// 5012).
+/// Of the heat, where the current squared is its mean over the heat: a standard deviation. The current that host-sim
+/// records says -0.5 to 0.4 percent more heat than the plant's joules, and down to -1.3 with load at top speed
+/// (designed, hidden motor 4110).
 constexpr double ordinary_load_share = 0.002;
 /// In the middle of what catalogues have (maxon, of 5 to 200 W: R1 0.03..1.4 of R2, C1 0.02..0.6 of C2).
 constexpr double usual_R1_share = 0.2, usual_C1_share = 0.11;
