@@ -381,6 +381,18 @@ TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
       << report.model_toml;
 }
 
+TEST(Report, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  Hidden log = hidden({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 11, .effects = {"windage"}});
+  wire::pc::MotorFile sheet;
+  sheet.motor = log.log.sheet;
+  EXPECT_TRUE(identify::discover(log.logs, sheet).verdict.ends_with("explained"));
+  std::swap(log.logs[0].of(identify::Role::core), log.logs[0].of(identify::Role::housing));
+  const auto report = identify::discover(log.logs, sheet);
+  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_NE(report.sentence.find("core_degC and housing_degC are swapped"), std::string::npos) << report.sentence;
+}
+
 TEST(ModelFile, TrustIsInWhatTheBoardsHeatDependsOn) {
   identify::Problem problem;
   const auto trust = [&](double together, bool at_bound = false, double misfit = 50) {
