@@ -608,20 +608,13 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   return out;
 }
 
-/// Which sets are as good? What is left over may belong to any of them, and the lead must hold where the housing is
-/// believed no closer than a model can be right. Told are the next best and those that differ from the best by no more
-/// than what is left.
-void mark_ties(const Problem& problem, const Problem& judged, const Left& left, double reach, const Margins& margins,
-               Search& out) {
+/// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
+/// from the best by no more than what is left.
+void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
-  const auto still_behind = [&](const Candidate& c) {
-    const Problem less = believed_less(judged, out.chosen.fit.chosen, 1);
-    const auto surprise = [&](const Fit& f) { return fit(less, f.chosen, {&f}).surprise(); };
-    return surprise(c.fit) - surprise(out.chosen.fit);
-  };
   for (Candidate& c : out.sets) {
     const double behind = out.chosen.gain - c.gain;
-    if (c.chosen || (behind >= reach && !(behind < margins.doubtful && still_behind(c) < margins.tie))) continue;
+    if (c.chosen || behind >= reach) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
     if (behind >= margins.tie && out.tied.size() > 1 &&
@@ -720,7 +713,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   choose(judged, margins, std::move(field), out);
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const double reach = left.complete ? margins.tie : margins.tie + left.gain;
-  mark_ties(problem, judged, left, reach, margins, out);
+  mark_ties(problem, left, reach, margins, out);
 
   std::string ladder;
   for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)

@@ -15,9 +15,6 @@ struct Margins {
   /// often for every two more.
   double detect = 13;
   double second = 10, tie = 6;
-  /// A lead of less is asked again where the housing is believed no closer than a model can be right. Of a whole board
-  /// (designed 4109) a lead of 21 over the truth came to nothing there.
-  double doubtful = 60;
   /// Of a set where the housing is believed no closer than a model can be right. Of 36 whole boards with nothing hidden
   /// one gained 19.0 and the others too little to be asked (gain --clean, designed 5001 to 5016 and 5201 to 5208, duty
   /// 5101 to 5112); radiation of a whole board (4109) gained 18.1 and 18.8, a board_heat (score, 771132) 18.8, and 157

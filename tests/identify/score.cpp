@@ -371,6 +371,7 @@ int main(int argc, char** argv) {
   app.add_option("--only", a.only, "one cause");
   app.add_option("--remove", a.remove, "take a cause out of the table");
   app.add_option("--structure", a.structure, "how far the clean motor is from two nodes, 1 = host-sim's default")
+      ->check(CLI::Range(0.01, 1.0))  // of no size at all, teeth and yoke have no time constant
       ->capture_default_str();
   app.add_option("--step", a.step_K, "K, of what the sensors tell: 1 = whole degrees")->capture_default_str();
   app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")->capture_default_str();
