@@ -202,14 +202,17 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
-/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors on the columns read otherwise leave less
-/// than the best cause does on these. Empty when nothing helps.
+/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors, or one cause, on the columns read otherwise
+/// leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
-  const double as_it_stands = fit(problem, {}).misfit;
-  const auto explained_by = [&](const std::vector<Log>& otherwise) {
-    const Fit other = fit(problem_of(otherwise, motor), {});
-    return other.misfit < best.misfit && other.misfit < 0.25 * as_it_stands;
+  constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
+  // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
+  const auto excess = [](const Fit& f) { return f.misfit - 0.5 * f.readings; };
+  const double as_it_stands = excess(fit(problem, {})), explained = excess(fit(problem, best.chosen, {&best}));
+  const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
+    const double left = excess(fit(read, chosen));
+    return left + clearly < explained && left < 0.25 * as_it_stands;
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
     return log.has(Role::current) && log.has(Role::speed) &&
@@ -219,7 +222,7 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   if (turns && !problem.heated_by_power()) {
     std::vector<Log> swapped = logs;
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
-    if (explained_by(swapped))
+    if (leaves_less(problem_of(swapped, motor), {}))
       return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
              "swapped; map them with --column.";
   }
@@ -241,7 +244,12 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
         for (double& reading : log.of(role)) reading = degF.factor * (reading + degF.offset);
       }
     }
-    if (explained_by(converted))
+    const Problem read = problem_of(converted, motor);
+    const auto with_a_cause = [&] {
+      const Search anew = search(read);
+      return !anew.singles.empty() && leaves_less(read, anew.singles.front().fit.chosen);
+    };
+    if (leaves_less(read, {}) || with_a_cause())
       return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
                          columns);
   }
@@ -276,7 +284,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         "housing_degC are swapped.",
         p.C1_J_per_K / p.C2_J_per_K);
   }
-  return found.base.ratio < 2 ? "" : misread_columns(problem, best, logs, motor);
+  return misread_columns(problem, best, logs, motor);
 }
 
 /// Logs to be fitted or scored together must have the same kind of heat; what else only some of them hold is taken for

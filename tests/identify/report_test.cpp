@@ -286,6 +286,20 @@ TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
           "--column housing_degC=COLUMN:degF --column core_degC=COLUMN:degF");
 }
 
+TEST(BadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  double sensor_degC = NAN;
+  refused(spoilt([&](auto& row, int) {
+            const double housing_degC = std::stod(row[3]);
+            if (std::isnan(sensor_degC)) sensor_degC = housing_degC;
+            sensor_degC += (housing_degC - sensor_degC) * (0.1 / 40);  // a sensor of 40 s, a row every 0.1 s
+            row[3] = std::to_string(sensor_degC);
+            row[5] = fahrenheit(row[5]);
+            return true;
+          }),
+          "--column core_degC=COLUMN:degF");
+}
+
 TEST(BadInput, CurrentAndSpeedSwapped) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   refused(spoilt([](auto& row, int number) {
