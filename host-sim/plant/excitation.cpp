@@ -31,29 +31,41 @@ Stretch next_of_robot(Random& random) {
   return {random.uniform(10, 60), 0, 0, 0, 0, random.uniform() < 0.5};
 }
 
+/// Found by search: of 250 drawn changes those were kept that left the nearest rival of each cause the most to
+/// explain and told R1 best (logs of 104 hidden effects without noise, seeds 950 to 954). Seconds are shares of a log.
+constexpr Stretch designed_steps[] = {
+    {3, 0, 0, 0, 0, false},
+    {5, -0.8, 0},
+    {4, -0.25, 1},
+    {12, 0, 0, 0, 0, false},
+    {3, -0.6, 0},
+    {6, 0, 0.6},
+    {5, 0, 0, 0, 0, false},
+    {3, 1.75, 0},
+    {4, 1.1, 0},
+    {8, 0, 0},
+    {8, 0, 0, 0, 0, false},
+    {3, -1.2, 0.5},
+    {2, 0, 0, 0, 0, false},
+    {4, 1.2, 1},
+    {2, 0.15, 0},
+    {5, 0.7, -0.65},
+    {3.5, -0.45, 0.45},
+    {9, 0, 0.6},
+    {6, -1.75, 0},
+    {1.6, -0.2, 0.7},
+    {6, 1.65, 0.15},
+    {9, 0, 0, 0, 0, false},
+};
+
 std::vector<Stretch> designed(double length_s, Random& random) {
-  std::vector<Stretch> cells;
-  const double currents[] = {0, 0.5, 0.9, 1.2}, speeds[] = {0, 0.35, 0.7, 1};
-  for (const double current : currents) {
-    for (const double speed : speeds) {
-      const double sign = random.uniform() < 0.5 ? -1 : 1;
-      cells.push_back({0, sign * current, sign * speed});
-    }
-  }
-  for (int i = 0; i < 3; ++i) cells.push_back({0, 0, 0, 0, 0, false});
-  for (std::size_t i = cells.size() - 1; i > 0; --i) std::swap(cells[i], cells[random.next() % (i + 1)]);
-  // A fifth of the time belongs to two cool-downs, at rest and spinning; the rest is shared by the cells, each of which
-  // ends with a burst.
+  double shares = 0;
+  for (const Stretch& step : designed_steps) shares += step.seconds;
   std::vector<Stretch> out;
-  const double cell_s = 0.8 * length_s / static_cast<double>(cells.size());
-  int n = 0;
-  for (Stretch cell : cells) {
-    cell.seconds = cell_s - 1;
-    out.push_back(cell);
-    out.push_back({1, (n++ % 2 ? -1 : 1) * random.uniform(2.5, 4), 0});
-    if (n == static_cast<int>(cells.size()) / 2) out.push_back({0.08 * length_s, 0, 0, 0, 0, false});
+  for (Stretch step : designed_steps) {
+    step.seconds *= length_s / shares * random.uniform(0.9, 1.1);  // so that no two logs are alike
+    out.push_back(step);
   }
-  out.push_back({0.06 * length_s, 0, 0.8});
   out.push_back({length_s, 0, 0, 0, 0, false});
   return out;
 }

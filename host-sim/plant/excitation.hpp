@@ -14,7 +14,7 @@ namespace host_sim {
 enum class Excitation {
   one_step,    // a rest, then one load for good
   robot_duty,  // gait with a ripple of 1..2 Hz, bursts, holding, rests; current and speed go together
-  designed,    // every current with every speed, both signs, bursts, cool-downs at rest and spinning
+  designed,    // stalled, spinning and loaded stretches, both signs, hot holds, rests: what tells causes apart soonest
 };
 
 /// One instant. Amplitude of the current vector, signed like its torque.

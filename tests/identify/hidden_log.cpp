@@ -11,6 +11,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "host-sim/plant/excitation.hpp"
 #include "wire/pc/motor_file.hpp"
 
 namespace tests {
@@ -75,24 +76,14 @@ std::vector<Row> robot_duty(Draw& d, double rms_A, double top, double seconds) {
   return rows;
 }
 
-/// Load crossed with speed, both signs, bursts, a hot stall, two ways of cooling down.
-std::vector<Row> designed_profile(Draw& d, double rms_A, double top, double seconds) {
-  struct Step {
-    double share, amps, speed;
-  };
-  static const Step steps[] = {{3, 0, 0},      {5, 1.6, 0},     {4, 0, 0.95},  {4, -1.6, 0}, {3, 0, 0}, {3, 2.2, 0},
-                               {4, 0.1, 0.45}, {5, 1.3, 0.9},   {3, -0.6, 0},  {3, 0.6, 0},  {5, 0, 0}, {4, 0.1, 0.98},
-                               {3, -1.5, 0.5}, {2, 2.4, 0},     {3, 0, 0.25},  {6, 1.5, 0},  {8, 0, 0}, {4, 1.5, 0.95},
-                               {6, 0, 0.95},   {4, -1.4, -0.4}, {3, 0.4, 0.7}, {2, -2.4, 0}, {9, 0, 0}};
-  double sum = 0;
-  for (const Step& s : steps) sum += s.share;
+/// As host-sim records it, at another load.
+std::vector<Row> designed_profile(Draw& d, const wire::Motor& sheet, double rms_A, double top, double seconds) {
+  constexpr double rms_of_rating = 0.77;
+  const auto demands =
+      host_sim::make_excitation(host_sim::Excitation::designed, sheet, top, seconds, 1 / row_s, d.random());
+  const double scale = rms_A / (rms_of_rating * host_sim::rated_amplitude_A(sheet));
   std::vector<Row> rows;
-  const auto n = static_cast<std::size_t>(seconds / row_s);
-  for (const Step& s : steps) {
-    const auto many = static_cast<std::size_t>(s.share / sum * static_cast<double>(n) * d.uniform(0.9, 1.1));
-    for (std::size_t i = 0; i < many && rows.size() < n; ++i) rows.push_back({s.amps * rms_A, s.speed * top});
-  }
-  while (rows.size() < n) rows.push_back({0, 0});
+  for (const host_sim::Demand& demand : demands) rows.push_back({scale * demand.current_A, demand.speed_rad_per_s});
   return rows;
 }
 
@@ -298,7 +289,7 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   const double start = d.uniform(0, 1) < 0.6 ? ambient : ambient + d.uniform(0, 12);
   const auto duty = [&](Draw& of) {
     return o.duty == Duty::robot ? robot_duty(of, rms_A, top, o.seconds)
-                                 : designed_profile(of, rms_A * 0.95, top, o.seconds);
+                                 : designed_profile(of, m, rms_A, top, o.seconds);
   };
   auto rows = duty(d);
   auto neighbour = wandering(d, rows.size(), ambient, 180);
