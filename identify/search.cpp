@@ -602,9 +602,10 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   out.steady = out.by_parts < margins.parts;
   out.complete = left.gain < margins.remains && out.steady;
   const bool rules_parts = out.steady || out.explains > margins.dominance * out.by_parts;
+  const bool unrested = problem.noise.idle_s == 0;
   out.mostly = rules_parts && (left.gain < margins.remains || out.explains > margins.dominance * left.gain ||
-                               out.after_K < margins.small_part * out.before_K);
-  out.nearly = rules_parts && problem.noise.idle_s == 0 && out.after_K < margins.small_part_unseen * out.before_K;
+                               (unrested && out.after_K < margins.small_part * out.before_K));
+  out.nearly = rules_parts && unrested && out.after_K < margins.small_part_unseen * out.before_K;
   return out;
 }
 

@@ -43,6 +43,7 @@ struct Draw {
 
 constexpr double row_s = 0.1;
 constexpr double least_error_K = 1, largest_error_K = 10;  // of the winding, or the reading, before any refit
+constexpr double hottest_degC = 150;                       // of a winding, before an effect is hidden
 
 /// What a robot's joint does: stand, hold, walk with a gait ripple, push, spin, rest.
 std::vector<Row> robot_duty(Draw& d, double rms_A, double top, double seconds) {
@@ -78,12 +79,14 @@ std::vector<Row> robot_duty(Draw& d, double rms_A, double top, double seconds) {
 
 /// As host-sim records it, at another load.
 std::vector<Row> designed_profile(Draw& d, const wire::Motor& sheet, double rms_A, double top, double seconds) {
-  constexpr double rms_of_rating = 0.77;
   const auto demands =
       host_sim::make_excitation(host_sim::Excitation::designed, sheet, top, seconds, 1 / row_s, d.random());
-  const double scale = rms_A / (rms_of_rating * host_sim::rated_amplitude_A(sheet));
+  double mean2 = 0;
+  for (const host_sim::Demand& demand : demands)
+    mean2 += demand.current_A * demand.current_A / static_cast<double>(demands.size());
   std::vector<Row> rows;
-  for (const host_sim::Demand& demand : demands) rows.push_back({scale * demand.current_A, demand.speed_rad_per_s});
+  for (const host_sim::Demand& demand : demands)
+    rows.push_back({rms_A / std::sqrt(mean2) * demand.current_A, demand.speed_rad_per_s});
   return rows;
 }
 
@@ -283,22 +286,19 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   const double tau = m.R2_K_per_W * m.C2_J_per_K, reached = 1 - std::exp(-0.6 * o.seconds / tau);
   const double heat_W = d.uniform(35, 55) / (m.R2_K_per_W * reached) / 1.25;
   double rms_A = std::sqrt(heat_W / (1.5 * m.phase_resistance_ohm));
-  // The winding stays below 150 degC: the long hold at 1.6 times the mean sets it.
+  // The long hold at 1.6 times the mean shall not bring the winding to its limit.
   rms_A = std::min(rms_A, std::sqrt(60 / (1.5 * m.phase_resistance_ohm * 1.4 * m.R1_K_per_W)) / 1.6);
   const double top = d.uniform(250, 600), ambient = d.uniform(18, 30);
   const double start = d.uniform(0, 1) < 0.6 ? ambient : ambient + d.uniform(0, 12);
   const auto duty = [&](Draw& of) {
     return o.duty == Duty::robot ? robot_duty(of, rms_A, top, o.seconds)
-                                 : designed_profile(of, m, rms_A, top, o.seconds);
+                                 : designed_profile(of, out.sheet, rms_A, top, o.seconds);
   };
   auto rows = duty(d);
   auto neighbour = wandering(d, rows.size(), ambient, 180);
   Draw mount{
       std::mt19937_64(o.seed * 104729 + 3)};  // its own stream: the rest stays as it was before there was a frame
   auto frame = wandering(mount, rows.size(), ambient, 250);
-  double mean2 = 0;
-  for (const Row& r : rows) mean2 += r.current_A * r.current_A / static_cast<double>(rows.size());
-  const double mean_heat = 1.5 * m.phase_resistance_ohm * mean2;
 
   host_sim::HeatOptions options;
   for (double* v : {&options.teeth_yoke_share_of_R1, &options.yoke_housing_share_of_R1, &options.teeth_share_of_C2,
@@ -309,7 +309,16 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
 
   // Size: the winding (or, for what only the sensor sees, the reading) is to be off by 1..10 K rms before any refit.
   HiddenEffects hidden;
-  const Track clean = run(m, options, hidden, rows, ambient, start, neighbour, frame, o.seed);
+  Track clean = run(m, options, hidden, rows, ambient, start, neighbour, frame, o.seed);
+  for (double hottest; (hottest = *std::max_element(clean.core.begin(), clean.core.end())) > hottest_degC;) {
+    const double less = 0.99 * std::sqrt((hottest_degC - ambient) / (hottest - ambient));
+    rms_A *= less;
+    for (Row& r : rows) r.current_A *= less;
+    clean = run(m, options, hidden, rows, ambient, start, neighbour, frame, o.seed);
+  }
+  double mean2 = 0;
+  for (const Row& r : rows) mean2 += r.current_A * r.current_A / static_cast<double>(rows.size());
+  const double mean_heat = 1.5 * m.phase_resistance_ohm * mean2;
   for (std::size_t e = 0; o.strength > 0 && e < o.effects.size(); ++e) {
     const bool other = d.uniform(0, 1) < 0.5;
     const double sign = d.sign(), when = d.uniform(0.25, 0.75) * o.seconds;
@@ -362,7 +371,7 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
     const double reading = t.sensed[i] + noise * (wander + 0.2 * d.gauss());
     const double housing = o.noisy ? in_steps(reading, o.step_K) : reading;
     const double amps = rows[i].current_A == 0 ? 0 : rows[i].current_A * (1 + noise * 0.01 * d.gauss());
-    fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.1f},{:.2f},{:.2f},{:.2f}",
+    fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.3f},{:.2f},{:.2f},{:.2f}",
                    static_cast<double>(i) * row_s, amps * direct, rows[i].speed_rad_per_s, housing,
                    ambient + 0.05 * d.gauss(), neighbour[i] + 0.1 * d.gauss(), frame[i] + 0.1 * mount.gauss());
     if (o.core != Core::none) text += ',';

@@ -218,7 +218,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       c.margins = a.margins;
       c.gain = row.hidden == Hidden::each_cause && !a.quick;
       c.separability = !a.quick && (row.hidden == Hidden::each_cause || row.hidden == Hidden::pairs ||
-                                    row.hidden == Hidden::removed);
+                                    row.hidden == Hidden::removed || row.hidden == Hidden::outside);
       c.follow = row.hidden == Hidden::each_cause && row.core == Core::sparse && !a.quick;
       out.push_back(std::move(c));
     }
@@ -234,10 +234,10 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
 /// What a row's answers say beside its own bounds.
 void add_measures(const Row& row, const std::vector<CaseResult>& results, Table& table) {
   int far = 0, far_named = 0, near = 0, near_named = 0, seen = 0, seen_named = 0, seen_covered = 0, ties = 0,
-      resolved = 0, parameters = 0, parameters_right = 0, worse = 0, far_answered = 0;
+      resolved = 0, parameters = 0, parameters_right = 0, worse = 0, far_answered = 0, far_unknown = 0;
   std::vector<double> ratios;
   for (const CaseResult& r : results) {
-    if (r.D && *r.D > 40) ++far, far_named += right(r), far_answered += r.named();
+    if (r.D && *r.D > 40) ++far, far_named += right(r), far_answered += r.named(), far_unknown += unknown(r);
     if (r.D && *r.D < 3) ++near, near_named += r.named();
     if (r.D && *r.D >= 3) ++seen, seen_named += right(r), seen_covered += covered(r);
     if (r.resolved) ++ties, resolved += *r.resolved;
@@ -249,6 +249,10 @@ void add_measures(const Row& row, const std::vector<CaseResult>& results, Table&
   }
   if (row.hidden == Hidden::removed && far > 0)
     table.add(row.key, "D > 40 another one named", far_answered, far, false, row.bounds[0].promised, 0.30);
+  if (row.hidden == Hidden::outside && far > 0) {
+    table.add(row.key, "D > 40 called unknown", far_unknown, far, true, row.bounds[0].promised, 0.40);
+    table.add(row.key, "D > 40 named", far_answered, far, false, row.bounds[1].promised, 0.30);
+  }
   if (row.hidden == Hidden::pairs && seen > 0) {
     table.add(row.key, "D >= 3 named exactly", seen_named, seen, true, row.bounds[0].promised, 0.40);
     table.add(row.key, "D > 40 named exactly", far_named, far, true, row.bounds[0].promised, 0.40);

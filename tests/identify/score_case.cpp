@@ -91,8 +91,20 @@ Problem without_noise(const Problem& problem, const std::vector<std::string>& tr
   return out;
 }
 
+/// The log itself without noise, of an effect that the table does not know; what no motor is without is averaged over.
+Problem as_it_was(const HiddenLogOptions& options, const Problem& problem, const HiddenLog& log,
+                  const std::string& path) {
+  HiddenLogOptions quiet = options;
+  quiet.noisy = false;
+  make_hidden_log(quiet, path);
+  Problem out = identify::problem_of(read(log, path), sheet_of(log));
+  out.noise = problem.noise;
+  out.leeway = identify::ordinary_leeway(out, identify::fit(out, {}));
+  return out;
+}
+
 /// How far the nearest rival stays behind on a log without noise: of the sets with no more causes than the truth, or
-/// with two where the truth was taken out of the table.
+/// with two where the table does not hold the truth.
 double separability(const Problem& clean, const std::vector<std::string>& truth,
                     const std::vector<std::string>& removed) {
   const auto out_of_table = [&](const identify::Cause& cause) {
@@ -109,7 +121,8 @@ double separability(const Problem& clean, const std::vector<std::string>& truth,
     singles.push_back(identify::fit(clean, {{static_cast<int>(c), -1}}, {&base}));
     D = std::min(D, 2 * singles.back().misfit);
   }
-  if (truth.size() == 1 && removed.empty()) return D;
+  const bool known = identify::cause_named(truth.front()) >= 0 && removed.empty();
+  if (truth.size() == 1 && known) return D;
   std::sort(singles.begin(), singles.end(), [](const Fit& a, const Fit& b) { return a.misfit < b.misfit; });
   for (std::size_t a = 0; a < singles.size(); ++a) {
     for (std::size_t b = a + 1; b < singles.size(); ++b) {
@@ -188,8 +201,11 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
                                found.base.ratio, found.chosen.ratio, found.chosen.explained);
   check_parameters(log, problem, found, result);
-  if (options.separability)
-    result.D = separability(without_noise(problem, result.truth), result.truth, options.removed);
+  if (options.separability) {
+    const bool outside = identify::cause_named(result.truth.front()) < 0;
+    result.D = separability(outside ? as_it_was(options.log, problem, log, path) : without_noise(problem, result.truth),
+                            result.truth, options.removed);
+  }
   if (options.gain) measure_gain(options, log, problem, found, path, result);
   if (options.follow && found.verdict == Verdict::ambiguous) follow(options, log, logs, problem, found, path, result);
   return result;

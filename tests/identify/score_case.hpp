@@ -30,7 +30,8 @@ struct CaseResult {
   /// rms error of the true winding, without noise, on another log of the same motor: both models fitted to the first.
   std::optional<double> core_before_K, core_after_K;
   int parameters = 0, parameters_right = 0;  // of rightly named causes; within two standard errors of the truth
-  /// Smallest misfit that any other single cause of the table leaves of a log without noise that the truth has made.
+  /// Smallest misfit that the table leaves of a log without noise: of any other single cause where the truth is one, of
+  /// any other set of two at most elsewhere.
   std::optional<double> D;
   std::optional<bool> resolved;  // a tie: did the advised experiment, played once, lead to the right name?
   double search_s = 0;
