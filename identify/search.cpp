@@ -482,7 +482,7 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
 
 /// Does a slow disturbance show that is more than sensors wander of themselves?
 bool noticeable(const Disturbance& d, const Margins& margins) {
-  return d.gain > margins.remains && d.noise.disturbance_K > margins.noticeable_K;
+  return d.gain > margins.remains && d.noise.disturbance_K > margins.disturbed_K;
 }
 
 /// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
@@ -597,7 +597,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   // Believed closer, what a motor has and no cause in the table is would count: a frame, teeth, a sensor's own offset.
   const Problem less = believed_less(judged, chosen, 1);
   out.still = fit(less, {}, {&found.base.fit}).surprise() - fit(less, chosen, {&found.chosen.fit}).surprise();
-  out.believed = out.explains > margins.detect && out.still > margins.still;
+  out.believed = out.explains > margins.tie && out.still > margins.still;
   out.by_parts = gained_by_parts(less, found.chosen.fit);
   out.steady = out.by_parts < margins.parts;
   out.complete = left.gain < margins.remains && out.steady;

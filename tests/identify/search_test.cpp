@@ -331,6 +331,22 @@ TEST(Search, WhereRestShowsHowTheSensorsWanderASmallPartThatIsLeftIsNotTheirs) {
       << "a tie, while a tenth of what two resistors miss might be left with rest as without";
 }
 
+TEST(Search, ANamelessDisturbanceIsARivalLikeOthers) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  expect_named({.duty = tests::Duty::designed, .seed = 780271, .effects = {"cooling_change"}},
+               "unknown_cause while it had to lead over a disturbance by as much as over two resistors");
+}
+
+TEST(Search, WhatWandersMoreThanASensorIsNotAdequate) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({.duty = tests::Duty::designed, .seed = 780485, .effects = {"natural_convection"}});
+  const std::vector<std::string> taken_out = {"natural_convection"};
+  EXPECT_EQ(identify::search(log.problem, {}, taken_out).verdict, Verdict::unknown_cause);
+  identify::Margins blind;
+  blind.disturbed_K = blind.noticeable_K;
+  EXPECT_EQ(identify::search(log.problem, blind, taken_out).verdict, Verdict::adequate);
+}
+
 TEST(Search, WhereTwoResistorsAreFarOffCausesStartFromTheSheetToo) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   expect_named({.core = tests::Core::none, .seed = 770255, .effects = {"frame_conduction"}},
