@@ -14,7 +14,7 @@ namespace host_sim {
 enum class Excitation {
   one_step,    // a rest, then one load for good
   robot_duty,  // gait with a ripple of 1..2 Hz, bursts, holding, rests; current and speed go together
-  designed,    // stalled, spinning and loaded stretches, both signs, hot holds, rests: what tells causes apart soonest
+  designed,    // pulses as long as the winding takes to warm, weak loads, spins, both signs, rests: tells causes apart
 };
 
 /// One instant. Amplitude of the current vector, signed like its torque.
@@ -29,7 +29,8 @@ struct Demand {
 /// Amplitude that would bring the winding to its limit in the end, from the sheet, 25 degC around.
 double rated_amplitude_A(const wire::Motor& sheet);
 
-/// Demands at a steady rate for the whole length of a log. `full_speed_rad_per_s` is what 1 means for speeds.
+/// Demands at a steady rate for the whole length of a log; currents go by the sheet's rating, pulses by its winding's
+/// time constant. `full_speed_rad_per_s` is what 1 means for speeds.
 std::vector<Demand> make_excitation(Excitation kind, const wire::Motor& sheet, double full_speed_rad_per_s,
                                     double length_s, double rate_Hz, std::uint64_t seed);
 

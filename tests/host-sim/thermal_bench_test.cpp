@@ -221,6 +221,23 @@ TEST(ThermalBench, DesignedExcitationCrossesCurrentWithSpeedAndRobotDutyTiesThem
   EXPECT_GT(tied, 0.35);
 }
 
+TEST(ThermalBench, DesignedExcitationPulsesByTheTimeConstantOfTheSheetsWinding) {
+  const auto longest_pulse_s = [](double times) {
+    wire::Motor sheet = plant_tests::small_motor();
+    sheet.C1_J_per_K *= times;
+    const double strong_A = 3 * host_sim::rated_amplitude_A(sheet);
+    double longest_s = 0, pulse_s = 0;
+    for (const Demand& d : host_sim::make_excitation(Excitation::designed, sheet, full_speed(), 1200, rate_Hz, 3)) {
+      pulse_s = std::fabs(d.current_A) > strong_A ? pulse_s + 1 / rate_Hz : 0;
+      longest_s = std::max(longest_s, pulse_s);
+    }
+    return longest_s;
+  };
+  const double winding_s = plant_tests::small_motor().R1_K_per_W * plant_tests::small_motor().C1_J_per_K;
+  EXPECT_GT(longest_pulse_s(1), winding_s);
+  EXPECT_NEAR(longest_pulse_s(2) / longest_pulse_s(1), 2, 0.1);
+}
+
 TEST(HiddenCauses, IdsAreUniqueAndEffectsAreDrawnToSize) {
   std::set<std::string> ids;
   const auto wanted = demands(Excitation::designed, 5, 1200);
