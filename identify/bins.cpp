@@ -21,10 +21,6 @@ constexpr double most_bins = 200000;
 /// Of the current with its ripple, rms: without it there is less, but for what two sensors differ by.
 constexpr double most_sampled_share = 1.1;
 
-/// Of a coarse sensor's step: how well its moment is known at worst (search.cpp asks the residual for better). Noise of
-/// 0 to 0.4 of it leaves readings 0.02 to 0.12 off (Masks.ASensorOfWholeDegreesIsReadAsItSteps holds them to this).
-constexpr double step_noise_share = 0.15;
-
 Drive heater(const Bins& log) { return log.has_power ? Drive::power_W : Drive::current_A2; }
 
 /// Missing cells replaced by the line between their neighbours.

@@ -151,6 +151,13 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   return out;
 }
 
+/// Of the coarsest housing sensor; 0: none is coarse.
+double coarsest_step_K(const Problem& problem) {
+  double step_K = 0;
+  for (const Bins& log : problem.logs) step_K = std::max(step_K, log.housing_step_K);
+  return step_K;
+}
+
 /// Rest shows the housing's slow noise, and with it what still flows inside the motor: never less than the noise. What
 /// is known of a coarse sensor's steps is known of the worst. Where the best model's residual is likelier with less,
 /// less is taken; never more: the noise would swallow what is wrong.
@@ -164,9 +171,8 @@ void refine_housing_noise(Problem& problem, const Fit& best) {
       problem.noise.*which = less.noise.*which;
     }
   };
-  double step_K = 0;
-  for (const Bins& log : problem.logs) step_K = std::max(step_K, log.housing_step_K);
-  if (step_K > 0) lessen(&Noise::housing_white_K, least_step_noise_share * step_K);
+  if (const double step_K = coarsest_step_K(problem); step_K > 0)
+    lessen(&Noise::housing_white_K, least_step_noise_share * step_K);
   lessen(&Noise::housing_slow_K, least_slow_K);
 }
 
@@ -480,9 +486,10 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
   fit_alone(problem, all, field);
 }
 
-/// Does a slow disturbance show that is more than sensors wander of themselves?
-bool noticeable(const Disturbance& d, const Margins& margins) {
-  return d.gain > margins.remains && d.noise.disturbance_K > margins.disturbed_K;
+/// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
+bool noticeable(const Problem& problem, const Disturbance& d, const Margins& margins) {
+  return d.gain > margins.remains &&
+         d.noise.disturbance_K > std::max(margins.disturbed_K, step_noise_share * coarsest_step_K(problem));
 }
 
 /// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
@@ -491,7 +498,7 @@ bool ends_without_a_name(const Problem& problem, const Field& field, const Distu
   const double gain = field.singles.empty() ? 0 : field.singles.front().gain;
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
   const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
-  const bool disturbed = noticeable(without_causes, margins);
+  const bool disturbed = noticeable(problem, without_causes, margins);
   if (gain > margins.detect && (moves >= margins.worth_K || disturbed)) return false;
   out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
   out.steps.push_back(
@@ -722,7 +729,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   out.steps.push_back("The best sets and their evidence: " + ladder + ".");
 
   const bool tie = out.tied.size() > 1;
-  if (!left.believed && !noticeable(without_causes, margins)) {
+  if (!left.believed && !noticeable(problem, without_causes, margins)) {
     out.verdict = Verdict::adequate;
     out.tied.clear();
     out.sets.clear();
