@@ -542,10 +542,17 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
   constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
-  Fit late = two_resistors;
-  late.chosen = {{cause_named("sensor_lag"), -1}};
-  late.x.resize(two_resistors.x.size() + 1);
-  late.x << two_resistors.x.head(base_count), tried_s, two_resistors.x.tail(two_resistors.x.size() - base_count);
+  // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
+  const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
+    const Edit e = cause_of(c).edit;
+    return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
+  });
+  const Fit& prompt = sensor ? two_resistors : motor;
+  Fit late = prompt;
+  late.chosen.push_back({cause_named("sensor_lag"), -1});
+  late.x.resize(prompt.x.size() + 1);
+  const Eigen::Index shared = base_count + prompt.cause_coordinates();
+  late.x << prompt.x.head(shared), tried_s, prompt.x.tail(prompt.x.size() - shared);
   Fit framed = two_resistors;
   framed.chosen = {{cause_named("third_mass"), -1}};
   framed.x.resize(two_resistors.x.size() + 2);
@@ -562,7 +569,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
                    warmed = replayed(uneven, motor, l);
-    lateness.housing_K.push_back(apart_K(lagged.housing_degC, plain.housing_degC, late_s / tried_s));
+    lateness.housing_K.push_back(apart_K(lagged.housing_degC, (sensor ? plain : even).housing_degC, late_s / tried_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
