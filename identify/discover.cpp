@@ -275,6 +275,9 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
     }
     at += static_cast<Eigen::Index>(cause.parameters.size());
   }
+  const std::string misread = misread_columns(problem, best, logs, motor);
+  if (!misread.empty()) return misread;
+  // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which.
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
   const Physical p = physical(found.chosen.fit.x);
@@ -284,7 +287,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         "housing_degC are swapped.",
         p.C1_J_per_K / p.C2_J_per_K);
   }
-  return misread_columns(problem, best, logs, motor);
+  return "";
 }
 
 /// Logs to be fitted or scored together must have the same kind of heat; what else only some of them hold is taken for
