@@ -114,6 +114,35 @@ TEST(Search, AStandingRotorsUnevenPhasesNeedNoName) {
   }
 }
 
+/// Of a motor whose stalls are heated three times as much, told 0.6 s late.
+TEST(Search, TheHeatOfACauseIsAllowedToComeLateToo) {
+  const identify::Chosen stall{identify::cause_named("stall_imbalance"), -1},
+      lag{identify::cause_named("sensor_lag"), -1};
+  Problem problem = hidden({"stall_imbalance"}, 1).problem;
+  identify::Fit motor = identify::fit(problem, {stall});
+  const Eigen::Index shared = identify::base_count + motor.cause_coordinates();
+  const auto as_it_was = identify::replayed(problem, motor, 0);
+  motor.x[identify::base_count] = 2;
+  identify::Fit late = motor;
+  late.chosen.push_back(lag);
+  late.x.resize(motor.x.size() + 1);
+  late.x << motor.x.head(shared), 0.6, motor.x.tail(motor.x.size() - shared);
+  const auto told = identify::replayed(problem, late, 0);
+  for (std::size_t k = 0; k < told.housing_degC.size(); ++k) {
+    problem.logs[0].bins[k].housing_degC += told.housing_degC[k] - as_it_was.housing_degC[k];
+    problem.logs[0].bins[k].core_degC += told.core_degC[k] - as_it_was.core_degC[k];
+  }
+  motor = identify::fit(problem, {stall}, {&motor});
+  const auto gained_by_a_lag = [&](const identify::Fit& as) {
+    Problem allowed = problem;
+    allowed.leeway = identify::ordinary_leeway(problem, as);
+    const identify::Fit prompt = identify::fit(allowed, {stall}, {&motor});
+    return prompt.surprise() - identify::fit(allowed, {stall, lag}, {&late}).surprise();
+  };
+  EXPECT_LT(gained_by_a_lag(motor), 0);
+  EXPECT_GT(gained_by_a_lag(identify::fit(problem, {})), identify::Margins{}.second) << "two resistors warm too slowly";
+}
+
 TEST(Search, ASensorThatIsQuieterThanAssumedIsNoDisturbance) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({"neighbour_heat"}, 4242);
