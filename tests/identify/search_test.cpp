@@ -143,6 +143,16 @@ TEST(Search, TheHeatOfACauseIsAllowedToComeLateToo) {
   EXPECT_GT(gained_by_a_lag(identify::fit(problem, {})), identify::Margins{}.second) << "two resistors warm too slowly";
 }
 
+TEST(Search, AWindingReadAllTheTimeIsBelievedNoCloserThanAModelCanBeRight) {
+  tests::HiddenLogOptions o{.duty = tests::Duty::designed, .core = tests::Core::dense};
+  const std::pair<std::uint64_t, const char*> once[] = {{3973000, "a delay of hundredths of a second"},
+                                                        {3983000, "a hot spot of 0.1 K"}};
+  for (const auto& [seed, named] : once) {
+    o.seed = seed;
+    EXPECT_EQ(identify::search(hidden(o).problem).verdict, Verdict::adequate) << named;
+  }
+}
+
 TEST(Search, ASensorThatIsQuieterThanAssumedIsNoDisturbance) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({"neighbour_heat"}, 4242);
