@@ -397,20 +397,22 @@ double housing_range_K(const Problem& problem) {
 }
 
 /// The same readings, believed no closer than `times` what no model follows; `chosen` says where the housing's sensor
-/// sits. Readings of a winding now and then are noisier than that.
+/// sits. Readings of a winding now and then are noisier than that, and what is known to be off by more says it already.
 Problem believed_less(Problem problem, const std::vector<Chosen>& chosen, double times) {
   const bool feels_winding =
       std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) { return cause_of(c).edit == Edit::sensor_share; });
   const Unmodelled& unmodelled = feels_winding ? of_a_winding : of_a_housing;
   const double unmodelled_K = times * unmodelled.share * housing_range_K(problem);
+  Noise& noise = problem.noise;
   const double wander_K = times * of_a_winding.share * housing_range_K(problem);
-  if (problem.noise.core_slow_K > 0 && problem.noise.core_slow_K < wander_K) {
-    problem.noise.core_slow_K = wander_K;
-    problem.noise.slow_s = of_a_winding.over_s;
+  const double disturbed_K = noise.disturbance_K * noise.core_slow_K / noise.housing_slow_K;
+  if (noise.core_slow_K > 0 && std::max(noise.core_slow_K, disturbed_K) < wander_K) {
+    noise.core_slow_K = wander_K;
+    noise.slow_s = of_a_winding.over_s;
   }
-  if (problem.noise.disturbance_K < unmodelled_K) {
-    problem.noise.disturbance_K = unmodelled_K;
-    problem.noise.disturbance_s = unmodelled.over_s;
+  if (noise.disturbance_K < unmodelled_K) {
+    noise.disturbance_K = unmodelled_K;
+    noise.disturbance_s = unmodelled.over_s;
   }
   return problem;
 }
