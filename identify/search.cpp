@@ -658,7 +658,7 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
 
 /// A board runs the model alone, on other loads: what is handed on is fitted with some leeway for load where R1 is not
 /// plain as well, to the noise that was judged by and no closer than such a model can be right. The leeway for lateness
-/// and frame stays: without it C1 of whole boards came out 10 percent too small in the median with standard errors of 4
+/// and frame stays: without it C1 of whole boards came out 7 percent too small in the median with standard errors of 3
 /// (gain, designed), and once a third too large (603: 11 K over the limit).
 void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   if (out.verdict == Verdict::adequate) mark_likelier(judged, margins, out);
