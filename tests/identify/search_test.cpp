@@ -144,9 +144,10 @@ TEST(Search, TheHeatOfACauseIsAllowedToComeLateToo) {
 }
 
 TEST(Search, AWindingReadAllTheTimeIsBelievedNoCloserThanAModelCanBeRight) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::HiddenLogOptions o{.duty = tests::Duty::designed, .core = tests::Core::dense};
   const std::pair<std::uint64_t, const char*> once[] = {{3973000, "a delay of hundredths of a second"},
-                                                        {3983000, "a hot spot of 0.1 K"}};
+                                                        {3983000, "a hot spot"}};
   for (const auto& [seed, named] : once) {
     o.seed = seed;
     EXPECT_EQ(identify::search(hidden(o).problem).verdict, Verdict::adequate) << named;
