@@ -619,8 +619,9 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   out.complete = left.gain < margins.remains && out.steady;
   const bool rules_parts = out.steady || out.explains > margins.dominance * out.by_parts;
   const bool unrested = problem.noise.idle_s == 0;
+  const double small_part = unrested ? margins.small_part_unrested : margins.small_part;
   out.mostly = rules_parts && (left.gain < margins.remains || out.explains > margins.dominance * left.gain ||
-                               (unrested && out.after_K < margins.small_part * out.before_K));
+                               out.after_K < small_part * out.before_K);
   out.nearly = rules_parts && unrested && out.after_K < margins.small_part_unseen * out.before_K;
   return out;
 }

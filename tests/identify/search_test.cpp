@@ -18,6 +18,7 @@
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"
+#include "tests/identify/bench_log.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "thermal/network.hpp"
@@ -376,6 +377,23 @@ TEST(Search, WhereRestShowsHowTheSensorsWanderASmallPartThatIsLeftIsNotTheirs) {
   ASSERT_GT(log.problem.noise.idle_s, 0);
   EXPECT_EQ(identify::search(log.problem).verdict, Verdict::unknown_cause)
       << "a tie, while a tenth of what two resistors miss might be left with rest as without";
+}
+
+/// One watt of constant heat that wanders by a third of it, and a housing sensor so quiet that this shows.
+TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
+  tests::BenchOptions o;
+  o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = 10, o.core_white_K = 0.5;
+  o.extra_housing_W = [](double t, double, double) { return 1 + 0.3 * std::sin(t / 30); };
+  const auto table = identify::read_table(tests::write_bench_log("hotcore_quiet.csv", o));
+  const auto problem = identify::problem_of(identify::logs_of(table, {}, std::nullopt),
+                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  ASSERT_GT(problem.noise.idle_s, 0);
+  const auto found = identify::search(problem);
+  EXPECT_EQ(found.verdict, Verdict::partly_explained);
+  EXPECT_EQ(found.tied.front(), (std::vector<std::string>{"constant_heat"}));
+  identify::Margins strict;
+  strict.small_part = 0;
+  EXPECT_EQ(identify::search(problem, strict).verdict, Verdict::unknown_cause);
 }
 
 TEST(Search, ANamelessDisturbanceIsARivalLikeOthers) {
