@@ -458,6 +458,12 @@ std::string why_no_pair(const Problem& problem, const Field& field, const Margin
 /// The best pair with either of its causes replaced by each other one: what a short look passed over may be as good.
 void add_neighbours(const Problem& problem, const Field& field, std::vector<Candidate>& sets) {
   const Candidate best = sets.front();
+  struct Neighbour {
+    std::vector<Chosen> pair;
+    const Fit* other;
+    Fit fit;
+  };
+  std::vector<Neighbour> all;
   for (const Chosen& kept : best.fit.chosen) {
     for (const Candidate& other : field.singles) {
       const Chosen more = other.fit.chosen.front();
@@ -465,10 +471,20 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
       const auto same = [&](const Candidate& c) {
         return std::is_permutation(pair.begin(), pair.end(), c.fit.chosen.begin(), c.fit.chosen.end());
       };
-      if (!compatible({kept}, more) || std::any_of(sets.begin(), sets.end(), same)) continue;
-      Fit f = fit(problem, pair, {&best.fit, &other.fit});
-      if (f.x.size() > 0) sets.push_back(candidate(field.base, std::move(f)));
+      if (compatible({kept}, more) && std::none_of(sets.begin(), sets.end(), same))
+        all.push_back({pair, &other.fit, {}});
     }
+  }
+  const Problem rough = coarse(problem, best.fit);
+  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  const double near = fit(rough, best.fit.chosen, {&best.fit}).surprise() + look_errs + look_errs_share * best.gain;
+  in_parallel(all.size(), [&](std::size_t i) {
+    Neighbour& n = all[i];
+    n.fit = fit(rough, n.pair, {&best.fit, n.other});
+    if (shorter) n.fit = n.fit.x.size() > 0 && n.fit.surprise() < near ? fit(problem, n.pair, {&n.fit}) : Fit{};
+  });
+  for (Neighbour& n : all) {
+    if (n.fit.x.size() > 0) sets.push_back(candidate(field.base, std::move(n.fit)));
   }
   sort(sets);
 }
