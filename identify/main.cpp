@@ -37,6 +37,16 @@ struct Arguments {
   int draws = 1000;
 };
 
+/// `--column A=B C=D` is how people write it; to the parser what follows the first is a log.
+void take_columns_from_logs(Arguments& a) {
+  std::erase_if(a.logs, [&](const std::string& word) {
+    const bool column = word.find('=') != std::string::npos && !std::filesystem::exists(word);
+    if (column) a.columns.push_back(word);
+    return column;
+  });
+  if (a.logs.empty()) throw UserError(Exit::usage, "No log is named; give the path of a CSV file.");
+}
+
 std::vector<Log> read(const std::string& path, const identify::ColumnMap& map,
                       const std::optional<wire::pc::MotorFile>& motor) {
   return identify::logs_of(identify::read_table(path), map, motor ? std::optional(motor->motor) : std::nullopt);
@@ -120,6 +130,7 @@ void show(const std::string& text) {
 }
 
 int answer(Arguments a) {
+  take_columns_from_logs(a);
   std::optional<wire::pc::MotorFile> motor;
   if (!a.motor.empty()) {
     const char* folder = std::getenv("HOTCORE_MOTORS");

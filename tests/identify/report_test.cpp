@@ -360,6 +360,19 @@ TEST(Program, AWrongOptionIsUsage) {
   EXPECT_EQ(run("--help").code, 0);
 }
 
+TEST(Program, ColumnsMayFollowOneWord) {
+  tests::BenchOptions options;
+  options.seconds = 60;
+  const std::string path = tests::write_bench_log("hotcore_columns.csv", options);
+  EXPECT_NE(
+      run("--column ambient_degC=sky coolant_degC=sea " + path).out.find("column 'sky' for ambient_degC is missing"),
+      std::string::npos);
+  EXPECT_NE(run(path + " --column ambient_degC=ambient_degC coolant_degC=sea")
+                .out.find("column 'sea' for coolant_degC is missing"),
+            std::string::npos);
+  EXPECT_EQ(run("--column ambient_degC=sky coolant_degC=sea").code, 2) << "no log";
+}
+
 TEST(Program, ALogWithoutLoadCannotBeUsed) {
   tests::BenchOptions options;
   options.seconds = 120;
