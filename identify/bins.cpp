@@ -253,6 +253,7 @@ Bins bins_of(const Log& log, double finest_s) {
                     t.size(), t.size() == 1 ? "" : "s", t.back()));
   if (!(usual_s > 0))
     refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
+  out.interval_s = usual_s;
   out.width_s = width_s_of(log, usual_s, finest_s);
   const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);
   out.bins.assign(std::max<std::size_t>(count, 1), Bin{});

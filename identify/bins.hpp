@@ -46,7 +46,7 @@ struct Bin {
 
 struct Bins {
   std::string name;
-  double width_s = 0;
+  double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
   double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences

@@ -12,6 +12,8 @@ namespace {
 /// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
 /// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
+/// When in its row's interval a dense winding was read, or the current: anywhere in it, this standard deviation.
+const double ordinary_moment_share = 1 / std::sqrt(12.0);
 /// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
 /// deviation.
 const double ordinary_uneven_share = 1 / std::sqrt(3.0);
@@ -121,7 +123,7 @@ struct Whitener {
     return {n, n.housing_white_K, n.housing_slow_K, n.disturbance_K, step_s};
   }
   static Whitener core(const Noise& n, double step_s) {
-    return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
+    return {n, n.core_white_K, n.core_slow_K, n.core_disturbance_K, step_s};
   }
 
   void reading(double n) {
@@ -541,18 +543,23 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   const Fit two_resistors = bare(motor);
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  constexpr double tried_s = 0.2;  // short: it shows the slope, and early is the reverse of late
+  // Short: they show the slope, and early is the reverse of late; in sharp bursts a delay shows it in hundredths.
+  constexpr double lag_s = 0.2, delay_s = 0.01;
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
   });
   const Fit& prompt = sensor ? two_resistors : motor;
-  Fit late = prompt;
-  late.chosen.push_back({cause_named("sensor_lag"), -1});
-  late.x.resize(prompt.x.size() + 1);
-  const Eigen::Index shared = base_count + prompt.cause_coordinates();
-  late.x << prompt.x.head(shared), tried_s, prompt.x.tail(prompt.x.size() - shared);
+  const auto later_by = [&](const char* cause, double by_s) {
+    Fit out = prompt;
+    const Eigen::Index shared = base_count + prompt.cause_coordinates();
+    out.chosen.push_back({cause_named(cause), -1});
+    out.x.resize(prompt.x.size() + 1);
+    out.x << prompt.x.head(shared), by_s, prompt.x.tail(prompt.x.size() - shared);
+    return out;
+  };
+  const Fit late = later_by("sensor_lag", lag_s), delayed = later_by("clock_delay", delay_s);
   Fit framed = two_resistors;
   framed.chosen = {{cause_named("third_mass"), -1}};
   framed.x.resize(two_resistors.x.size() + 2);
@@ -563,21 +570,27 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
   Problem uneven = problem;
   uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
-  Leeway lateness, frame, phases;
+  Leeway lateness, frame, phases, moment;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
-                   warmed = replayed(uneven, motor, l);
-    lateness.housing_K.push_back(apart_K(lagged.housing_degC, (sensor ? plain : even).housing_degC, late_s / tried_s));
+                   warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l);
+    const Replayed& at_once = sensor ? plain : even;
+    const double moment_s = problem.logs[static_cast<std::size_t>(l)].interval_s * ordinary_moment_share;
+    lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
+    moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
+    moment.core_K.push_back(apart_K(after.core_degC, at_once.core_degC, moment_s / delay_s));
     frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
     phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
     phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
   }
-  if (!(problem.uneven_per_A2 > 0)) return {lateness, frame};
-  return {lateness, frame, phases};
+  std::vector<Leeway> out = {lateness, frame};
+  if (problem.uneven_per_A2 > 0) out.push_back(phases);
+  if (problem.noise.core_slow_K > 0) out.push_back(moment);
+  return out;
 }
 
 Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
