@@ -123,7 +123,7 @@ struct Whitener {
     return {n, n.housing_white_K, n.housing_slow_K, n.disturbance_K, step_s};
   }
   static Whitener core(const Noise& n, double step_s) {
-    return {n, n.core_white_K, n.core_slow_K, n.core_disturbance_K, step_s};
+    return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
   }
 
   void reading(double n) {

@@ -31,8 +31,7 @@ struct Belief {
 struct Noise {
   double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
   double core_white_K = 1, core_slow_K = 0;      // slow 0: read so rarely that all is white
-  double disturbance_K = 0, disturbance_s = 60;  // of the housing
-  double core_disturbance_K = 0;                 // a winding that wanders more is disturbed more
+  double disturbance_K = 0, disturbance_s = 60;  // of the housing; a winding that wanders more is disturbed more
   double idle_s = 0;                             // how much rest it was taken from; 0: assumed
 };
 

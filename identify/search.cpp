@@ -132,7 +132,6 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
     double most = own;
     for (double factor = 0.6; factor < 1000; factor *= 1.6) {
       disturbed.noise.disturbance_K = factor * problem.noise.housing_slow_K;
-      disturbed.noise.core_disturbance_K = factor * problem.noise.core_slow_K;
       Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
       if (f.x.size() == 0) break;
       const double reached = evidence(disturbed, f);
@@ -378,8 +377,7 @@ void fit_pairs(const Problem& problem, Field& field) {
 constexpr struct Unmodelled { double share, over_s; } of_a_housing{0.001, 240};
 /// A winding has no single temperature: a sensor that feels it sees phases, teeth and end turns go their own ways
 /// within seconds. Believed as a housing, such sensors of host-sim came out on the very winding (602, 10003, 10045;
-/// true is 0.9 of the way), and as a winding within two of their standard errors. A winding that is read all the time
-/// goes those ways too: believed closer, one of 25 clean logs is called unknown (score clean-dense, 3973000).
+/// true is 0.9 of the way), and as a winding within two of their standard errors.
 constexpr Unmodelled of_a_winding{0.01, 5};
 /// A further cause must be worth it where the model may be off by twice that. Both chosen on gain's seeds 501 to 508
 /// and 601 to 612: at once that, false second causes of 508 and 607 still passed; with the board's fit at twice that,
@@ -406,13 +404,7 @@ Problem believed_less(Problem problem, const std::vector<Chosen>& chosen, double
   Noise& noise = problem.noise;
   if (noise.disturbance_K < unmodelled_K) {
     noise.disturbance_K = unmodelled_K;
-    noise.core_disturbance_K = unmodelled_K * noise.core_slow_K / noise.housing_slow_K;
     noise.disturbance_s = unmodelled.over_s;
-  }
-  const double wander_K = times * of_a_winding.share * housing_range_K(problem);
-  if (noise.core_slow_K > 0 && std::max(noise.core_slow_K, noise.core_disturbance_K) < wander_K) {
-    noise.core_slow_K = wander_K;
-    noise.slow_s = of_a_winding.over_s;
   }
   return problem;
 }
