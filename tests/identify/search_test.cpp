@@ -417,6 +417,20 @@ TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
   EXPECT_EQ(identify::search(problem, strict).verdict, Verdict::unknown_cause);
 }
 
+TEST(Search, WhatABoardIsHandedFollowsAWindingReadAllTheTime) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions o;
+  o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = 0.1, o.core_white_K = 0.05;
+  o.extra_housing_W = [](double t, double, double) { return 1 + 0.3 * std::sin(t / 30); };
+  const auto table = identify::read_table(tests::write_bench_log("hotcore_followed.csv", o));
+  const auto problem = identify::problem_of(identify::logs_of(table, {}, std::nullopt),
+                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  const auto found = identify::search(problem);
+  ASSERT_EQ(found.sets.front().fit.chosen, found.chosen.fit.chosen);
+  EXPECT_LT(identify::rmse_of(problem, found.chosen.fit).core_K,
+            1.1 * identify::rmse_of(problem, found.sets.front().fit).core_K);
+}
+
 TEST(Search, ANamelessDisturbanceIsARivalLikeOthers) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   expect_named({.duty = tests::Duty::designed, .seed = 780271, .effects = {"cooling_change"}},
