@@ -401,13 +401,20 @@ TEST(Search, WhereRestShowsHowTheSensorsWanderASmallPartThatIsLeftIsNotTheirs) {
 }
 
 /// One watt of constant heat that wanders by a third of it, and a housing sensor so quiet that this shows.
-TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
+Problem of_wandering_heat(double core_every_s, double core_white_K) {
   tests::BenchOptions o;
-  o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = 10, o.core_white_K = 0.5;
+  o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = core_every_s, o.core_white_K = core_white_K;
   o.extra_housing_W = [](double t, double, double) { return 1 + 0.3 * std::sin(t / 30); };
-  const auto table = identify::read_table(tests::write_bench_log("hotcore_quiet.csv", o));
-  const auto problem = identify::problem_of(identify::logs_of(table, {}, std::nullopt),
-                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  const std::string name =
+      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
+  return identify::problem_of(
+      identify::logs_of(identify::read_table(tests::write_bench_log(name, o)), {}, std::nullopt),
+      wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+}
+
+TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Problem problem = of_wandering_heat(10, 0.5);
   ASSERT_GT(problem.noise.idle_s, 0);
   const auto found = identify::search(problem);
   EXPECT_EQ(found.verdict, Verdict::partly_explained);
@@ -419,12 +426,7 @@ TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
 
 TEST(Search, WhatABoardIsHandedFollowsAWindingReadAllTheTime) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
-  tests::BenchOptions o;
-  o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = 0.1, o.core_white_K = 0.05;
-  o.extra_housing_W = [](double t, double, double) { return 1 + 0.3 * std::sin(t / 30); };
-  const auto table = identify::read_table(tests::write_bench_log("hotcore_followed.csv", o));
-  const auto problem = identify::problem_of(identify::logs_of(table, {}, std::nullopt),
-                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  const Problem problem = of_wandering_heat(0.1, 0.05);
   const auto found = identify::search(problem);
   ASSERT_EQ(found.sets.front().fit.chosen, found.chosen.fit.chosen);
   EXPECT_LT(identify::rmse_of(problem, found.chosen.fit).core_K,
