@@ -34,9 +34,10 @@ struct Margins {
   /// What is explained over what is left, to be named as the larger part. Of effects outside the table that left more
   /// than `remains` 2 of 34 passed (seeds 870 to 873), of one effect over eleven small ones 28 of 35 (770, 870, 871).
   double dominance = 4;
-  /// Or: the disturbance left beside the causes, of what the baseline misses, K over K. Ten drives of a simulated
-  /// traction motor of five masses, read to 0.05 K, left 0.015 to 0.037, and far more than `dominance` allows; outside
-  /// effects not named anyhow left 0.08 and more (112 logs, duty and designed, seeds 870, 890, 895, 900).
+  /// Or: the disturbance left beside the causes, of what the baseline misses, K over K. Ten drives of a traction motor
+  /// of five masses, simulated apart from this repository and read to 0.05 K, left 0.015 to 0.037. Outside effects that
+  /// nothing else names left 0.08 and more (140 logs, duty and designed, seeds 870 to 872, 890, 891, 895 to 897, 900,
+  /// 901), but for one thermostat (901), every answer to which then holds a cooling change.
   double small_part = 0.05;
   /// The same where no rest shows how the sensors wander: what is left may be theirs. Beside an imitation, outside
   /// effects left 0.1 and more in 25 of 26 such logs (seeds 660, 661, 800, 801).
