@@ -13,7 +13,7 @@ namespace {
 
 std::uint8_t mask_of(const std::string& axis) { return axis == "both" ? 3 : axis == "1" ? 2 : 1; }
 
-Json json_of(const Driven& d) {
+Json summary(const Driven& d) {
   return {{"seconds", d.seconds},
           {"peak_A", number(d.peak_A)},
           {"core_start_degC", number(d.start_degC)},
@@ -43,7 +43,7 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
     text += fmt::format("Held back for {:.2f} s, at last because {}. What to do: {}.\n", driven.held_back_s,
                         why.happened, why.advice);
   }
-  console.say(text, json_of(driven));
+  console.say(text, summary(driven));
 }
 
 /// Armed at a steady level until Ctrl-C or for so long.

@@ -277,6 +277,7 @@ TEST(Search, ASensorOnTheStatorIsFoundAndTheBoardsSetPutsItThere) {
 }
 
 TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto bin_s = [](const tests::HiddenLogOptions& o) {
     return identify::problem_of(hidden(o).logs, std::nullopt).logs[0].width_s;  // a sheet would make them short at once
   };
@@ -495,6 +496,7 @@ identify::Report report_of(const tests::HiddenLogOptions& o) {
 }
 
 TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto nothing = report_of({.seed = 5003}), small = report_of({.seed = 5003, .effects = {"hot_spot"}});
   EXPECT_EQ(nothing.verdict, "adequate");
   EXPECT_EQ(nothing.model_toml.find("hot spot"), std::string::npos);
@@ -503,6 +505,7 @@ TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
 }
 
 TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
   ASSERT_EQ(report.verdict, "unknown_cause");
   EXPECT_NE(report.model_toml.find("power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n"), std::string::npos)
