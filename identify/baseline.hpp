@@ -29,6 +29,9 @@ void add_plots(const Problem& problem, const Fit& fit, const std::string& remark
 /// The same for the extended model, into plots that are there already, from the first-th on.
 void add_extended(const Problem& problem, const Fit& fit, Report& report, std::size_t first);
 
+/// Standard error to state of a parameter, from that of its fit: no motor is a network of a few nodes.
+double stated_error(double value, double std_error);
+
 /// R1, R2, C1 and C2. `inflation`: of the standard errors, where the model leaves more than noise.
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
 

@@ -359,7 +359,7 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
       line.unit = parameter.unit;
       line.value = parameter_value(problem, cause, static_cast<int>(p), f.x[at]);
       const double slope = parameter.logarithmic ? line.value : problem.scale(parameter.scale, cause.drive);
-      line.std_error = std::abs(slope) * sd[at];
+      line.std_error = stated_error(line.value, std::abs(slope) * sd[at]);
       line.at_bound = f.at_bound[static_cast<std::size_t>(at)];
       line.determined = !line.at_bound && sd[at] < 0.7 * parameter.typical;
       out.push_back(line);
