@@ -446,6 +446,30 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
   }
 }
 
+/// By how much the readings lie nearest to what this motor would show at once: with a fast winding every burst is a
+/// valley of its own, and a descent ends in the next.
+double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s, double high_s) {
+  constexpr double apart_s = 1;
+  std::vector<Replayed> simulated;
+  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) simulated.push_back(replayed(problem, prompt, l));
+  double least = 1e300, out_s = 0;
+  for (double delay_s = low_s; delay_s <= high_s; delay_s += apart_s) {
+    double sum = 0;
+    for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+      const Bins& log = problem.logs[l];
+      const auto last = static_cast<std::ptrdiff_t>(log.bins.size()) - 1, later = std::lround(delay_s / log.width_s);
+      for (std::ptrdiff_t k = 0; k <= last; ++k) {
+        const Bin& bin = log.bins[static_cast<std::size_t>(k)];
+        const auto then = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k - later, 0, last));
+        if (bin.housing_n > 0) sum += std::pow(bin.housing_degC - simulated[l].housing_degC[then], 2);
+        if (bin.core_n > 0) sum += std::pow(bin.core_degC - simulated[l].core_degC[then], 2);
+      }
+    }
+    if (sum < least) least = sum, out_s = delay_s;
+  }
+  return out_s;
+}
+
 /// The motor that a fit found, without its causes.
 Fit bare(const Fit& f) {
   Fit out = f;
@@ -520,9 +544,18 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
 
   // A few steps tell which valley is worth descending into.
   constexpr int look = 4;
-  const auto starts = starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last));
+  const auto usual_starts = starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last));
   const auto fitted_from = [&](Eigen::VectorXd from) {
     Fit best;
+    auto starts = usual_starts;
+    if (cause_of(chosen.back()).edit == Edit::delay) {
+      Fit prompt;
+      prompt.chosen.assign(chosen.begin(), chosen.end() - 1);
+      prompt.x.resize(n - 1);
+      prompt.x << from.head(last), from.tail(n - last - 1);
+      const Coordinate& delay = c[static_cast<std::size_t>(last)];
+      starts.push_back({likeliest_delay_s(problem, prompt, delay.low, delay.high)});
+    }
     for (const auto& start : starts) {
       for (std::size_t p = 0; p < start.size(); ++p) from[last + static_cast<Eigen::Index>(p)] = start[p];
       Fit f = descend(problem, averaged, chosen, c, from, starts.size() > 1 ? std::min(look, most) : most);
