@@ -15,6 +15,8 @@ namespace {
 
 constexpr const char* base_names[] = {"R1", "R2", "C1", "C2"};
 constexpr const char* base_units[] = {"K/W", "K/W", "J/K", "J/K"};
+constexpr Scale base_scales[] = {Scale::core_resistance, Scale::sink_resistance, Scale::core_capacity,
+                                 Scale::housing_capacity};
 // A parameter known worse than this (as a factor of e^0.35, about 40 %) is the sheet's word and not the data's.
 constexpr double determined_sd = 0.35;
 
@@ -109,20 +111,37 @@ double stated_error(double value, double std_error) {
   return std::hypot(std_error, form_share * value);
 }
 
+std::string stated_unit(const Problem& problem, const char* unit, Scale scale) {
+  if (problem.belief.known || problem.heated_by_power()) return unit;
+  switch (scale) {
+    case Scale::core_resistance:
+    case Scale::sink_resistance:
+      return fmt::format("{} x ohm", unit);
+    case Scale::heat:
+    case Scale::heat_per_drive:
+    case Scale::sink_conductance:
+    case Scale::core_capacity:
+    case Scale::housing_capacity:
+      return fmt::format("{} / ohm", unit);
+    case Scale::one:
+    case Scale::rms_current:
+    case Scale::duration:
+    case Scale::speed08:
+      break;
+  }
+  return unit;
+}
+
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& f, double inflation) {
   std::vector<ParameterLine> out;
   const Eigen::VectorXd sd = f.std_errors();
   for (int i = 0; i < base_count; ++i) {
-    ParameterLine line{
-        base_names[i], base_units[i], std::exp(f.x[i]), 0, false, f.at_bound[static_cast<std::size_t>(i)]};
+    ParameterLine line{base_names[i], stated_unit(problem, base_units[i], base_scales[i]), std::exp(f.x[i]), 0, false,
+                       f.at_bound[static_cast<std::size_t>(i)]};
     const double of_log = sd[i] * inflation;
     line.std_error = stated_error(line.value, line.value * std::min(of_log, 10.0));
     line.determined = sd_from_data(f, i) * inflation < determined_sd && of_log < determined_sd;
     out.push_back(line);
-  }
-  if (!problem.belief.known && !problem.heated_by_power()) {
-    out[0].unit = out[1].unit = "K/W x ohm";
-    out[2].unit = out[3].unit = "J/K / ohm";
   }
   return out;
 }
