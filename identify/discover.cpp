@@ -165,6 +165,11 @@ std::string too_poor(const Problem& problem, const Fit& base) {
   }
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
+  // Two resistors that miss much may see no cooling at all where a cause lets it be seen.
+  if (all < housing_s && !determines(problem, base)) {
+    const Fit better = search(problem).chosen.fit;
+    if (determines(problem, better)) housing_s = std::min(housing_s, time_constant_s(better));
+  }
   if (all < housing_s) {
     const bool known = problem.belief.known || determines(problem, base);
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
@@ -202,13 +207,15 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
+/// What a fit misses over what noise alone would leave.
+double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
+
 /// Two columns swapped, or a temperature in Fahrenheit? Then two resistors, or one cause, on the columns read otherwise
 /// leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
-  const auto excess = [](const Fit& f) { return f.misfit - 0.5 * f.readings; };
   const double as_it_stands = excess(fit(problem, {})), explained = excess(fit(problem, best.chosen, {&best}));
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
     const double left = excess(fit(read, chosen));
@@ -256,6 +263,15 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   return "";
 }
 
+/// With the two temperatures swapped, does one cause leave no more than the best does as they stand?
+bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
+                             const std::optional<wire::pc::MotorFile>& motor) {
+  for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
+  const Problem read = problem_of(logs, motor);
+  const Search anew = search(read);
+  return !anew.singles.empty() && excess(anew.singles.front().fit) < excess(fit(problem, best.chosen, {&best}));
+}
+
 /// C1 over C2: in catalogues 0.6 at most (maxon, of 5 to 200 W), three times as far allowed as for a belief.
 constexpr double heaviest_winding = 1.8;
 
@@ -277,11 +293,12 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   }
   const std::string misread = misread_columns(problem, best, logs, motor);
   if (!misread.empty()) return misread;
-  // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which.
+  // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which. So does a motor
+  // that is more than two masses; read the other way round it does not follow the load.
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
   const Physical p = physical(found.chosen.fit.x);
-  if (both && p.C1_J_per_K > heaviest_winding * p.C2_J_per_K) {
+  if (both && p.C1_J_per_K > heaviest_winding * p.C2_J_per_K && follows_as_well_swapped(problem, best, logs, motor)) {
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",
@@ -356,7 +373,7 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
       const Parameter& parameter = cause.parameters[p];
       ParameterLine line;
       line.name = parameter.name;
-      line.unit = parameter.unit;
+      line.unit = stated_unit(problem, parameter.unit, parameter.scale);
       line.value = parameter_value(problem, cause, static_cast<int>(p), f.x[at]);
       const double slope = parameter.logarithmic ? line.value : problem.scale(parameter.scale, cause.drive);
       line.std_error = stated_error(line.value, std::abs(slope) * sd[at]);

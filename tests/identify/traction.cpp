@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// A motor that is nothing like ours, without a sheet: does what is found foretell the winding where it was not fitted?
+// For each seed a traction drive is recorded (traction.hpp); the first three quarters are fitted and chosen on, the
+// last is foretold.
+//   build/host/bin/traction --seeds 20 [--first 1] [--json]
+#include "tests/identify/traction.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "identify/discover.hpp"
+#include "identify/median.hpp"
+#include "tests/identify/chance.hpp"
+
+int main(int argc, char** argv) {
+  // The promise for a measured drive of this kind: rms of the winding where nothing was fitted.
+  constexpr double most_K = 4;
+  CLI::App app{"What identify foretells of traction drives of five masses"};
+  int seeds = 20;
+  std::uint64_t first = tests::rotating_seed();
+  bool json = false;
+  app.add_option("--seeds", seeds, "drives")->capture_default_str();
+  app.add_option("--first", first, "first seed")->capture_default_str();
+  app.add_flag("--json", json, "the drives as JSON");
+  CLI11_PARSE(app, argc, argv);
+
+  identify::HoldOut held;
+  held.fraction = 0.25;
+  const identify::ColumnMap map = identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/paderborn.toml");
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  std::vector<double> before, after;
+  int answered = 0, kept = 0, kept_by_two = 0;
+  for (int s = 0; s < seeds; ++s) {
+    const std::uint64_t seed = first + static_cast<std::uint64_t>(s);
+    const std::string path = tests::write_traction_log(fmt::format("hotcore_traction_{}.csv", getpid()), seed);
+    const auto logs = identify::logs_of(identify::read_table(path), map, std::nullopt);
+    std::filesystem::remove(path);
+    const auto report = identify::discover(logs, std::nullopt, held);
+    const double two_K = report.held_out->before.core_K, found_K = report.held_out->after.core_K;
+    before.push_back(two_K);
+    after.push_back(found_K);
+    answered += report.verdict != "unknown_cause" && report.verdict != "insufficient";
+    kept += found_K <= most_K;
+    kept_by_two += two_K <= most_K;
+    std::string tied;
+    for (const auto& ids : report.tied) tied += fmt::format(" {}", fmt::join(ids, "+"));
+    list.push_back(
+        {{"seed", seed}, {"verdict", report.verdict}, {"unseen_winding_K", {two_K, found_K}}, {"sets", tied}});
+    fmt::print(stderr, "{:>3}/{} seed {:<8} {:<17} unseen winding {:6.2f} -> {:5.2f} K {}\n", s + 1, seeds, seed,
+               report.verdict, two_K, found_K, tied);
+  }
+  const auto worst = [](const std::vector<double>& of) { return *std::max_element(of.begin(), of.end()); };
+  if (json)
+    fmt::print("{}\n", nlohmann::ordered_json{{"answered", answered}, {"within", kept}, {"drives", list}}.dump(2));
+  else
+    fmt::print(
+        "{} drives, {} answered; on the last quarter, not fitted, the winding is missed by {:.1f} K rms in the median "
+        "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {})\n",
+        seeds, answered, identify::median(after), worst(after), identify::median(before), worst(before), most_K, kept,
+        kept_by_two);
+}
