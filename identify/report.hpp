@@ -55,6 +55,7 @@ struct Interval {
 struct HeldOut {
   std::string how;
   Rmse before, after;
+  std::vector<std::string> nearest;             // where no set explains all: the one that `after` is of
   bool winding = false;                         // the intervals are of the winding's rms; else of the housing's
   int blocks = 0;                               // of a minute
   std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few
@@ -86,6 +87,7 @@ inline constexpr const char* gauge_words =
     "all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be "
     "seen";
 std::string cause_heading(const std::string& verdict);  // "Behaves like"
+std::string nearest_words(const HeldOut& held_out);     // which has a nearest set
 std::string interval_words(const HeldOut& held_out);    // which has intervals
 std::string whiteness_words(const Whiteness& of_residual);
 

@@ -173,6 +173,7 @@ std::string errors(const Report& r) {
       line("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
     line("not seen (" + r.held_out->how + ")", r.held_out->before);
     if (!r.causes.empty()) line("the same, extended model", r.held_out->after);
+    if (!r.held_out->nearest.empty()) line("the same " + nearest_words(*r.held_out), r.held_out->after);
   }
   s += "</table>\n";
   if (r.held_out && r.held_out->before_95) s += paragraph(interval_words(*r.held_out));

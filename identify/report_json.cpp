@@ -91,6 +91,7 @@ std::string as_json(const Report& r) {
     out["held_out"] = {{"how", r.held_out->how},
                        {"rmse_before_K", rms(r.held_out->before)},
                        {"rmse_after_K", rms(r.held_out->after)},
+                       {"nearest", r.held_out->nearest},
                        {"worst_before_K", number(worst(r.held_out->before))},
                        {"worst_after_K", number(worst(r.held_out->after))}};
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -104,6 +105,7 @@ std::string unseen(const Report& r) {
   for (std::size_t i = 0; i < h.each_before.size() && h.each_before.size() > 1; ++i)
     s += fmt::format("    {}: {}\n", h.names[i], rmse(h.each_before[i]));
   if (!r.causes.empty()) s += "  after:  " + rmse(h.after) + "\n";
+  if (!h.nearest.empty()) s += fmt::format("  {}: {}\n", nearest_words(h), rmse(h.after));
   if (h.before_95) s += "  " + interval_words(h) + "\n";
   return s;
 }
@@ -130,6 +132,10 @@ std::string cause_heading(const std::string& verdict) {
   return verdict == "ambiguous"          ? "May behave like"
          : verdict == "partly_explained" ? "Behaves mostly like"
                                          : "Behaves like";
+}
+
+std::string nearest_words(const HeldOut& h) {
+  return fmt::format("by the nearest set, {}, which is no explanation", fmt::join(h.nearest, " and "));
 }
 
 std::string interval_words(const HeldOut& h) {

@@ -717,6 +717,13 @@ std::vector<std::string> ids_of(const std::vector<Chosen>& chosen) {
   return out;
 }
 
+Fit best_alone(const Problem& problem) {
+  Field field;
+  fit_alone(problem, available(problem, {}), field);
+  const bool better = !field.singles.empty() && field.singles.front().gain > 0;
+  return better ? field.singles.front().fit : field.base.fit;
+}
+
 Search search(const Problem& given, const Margins& margins, const std::vector<std::string>& without) {
   Problem problem = given;
   Search out;

@@ -82,6 +82,9 @@ struct Search {
 
 std::vector<std::string> ids_of(const std::vector<Chosen>& chosen);
 
+/// Of two resistors and every cause alone the one that follows the logs best.
+Fit best_alone(const Problem& problem);
+
 /// `without`: ids left out of the table (tests take the truth away and expect "unknown").
 Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {});
 

@@ -17,6 +17,7 @@
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "tests/identify/slow_build.hpp"
+#include "tests/identify/traction.hpp"
 
 namespace {
 
@@ -333,6 +334,33 @@ TEST(Report, ThePageIsOneFileAndEscapesWhatItShows) {
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(html.find("src="), std::string::npos);
   EXPECT_EQ(html.find("<link"), std::string::npos);
+}
+
+identify::Report foretold(std::uint64_t seed) {
+  identify::HoldOut held;
+  held.fraction = 0.25;
+  return identify::discover(tests::traction_drive("hotcore_drive_" + std::to_string(seed) + ".csv", seed), std::nullopt,
+                            held);
+}
+
+TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const identify::Report report = foretold(37);
+  EXPECT_EQ(report.verdict, "ambiguous") << report.sentence;
+  EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
+  const auto hot_spot =
+      std::find_if(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.id == "hot_spot"; });
+  ASSERT_NE(hot_spot, report.causes.end());
+  EXPECT_EQ(hot_spot->parameters[0].unit, "J/K / ohm") << "no sheet says the resistance";
+}
+
+TEST(Traction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const identify::Report report = foretold(4);
+  EXPECT_EQ(report.verdict, "unknown_cause") << report.sentence;
+  EXPECT_TRUE(report.causes.empty());
+  EXPECT_EQ(report.held_out->nearest.size(), 2u);
+  EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
 }
 
 TEST(Program, UnknownMotorIsAnsweredWithTheNearest) {

@@ -11,7 +11,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
@@ -32,15 +31,12 @@ int main(int argc, char** argv) {
 
   identify::HoldOut held;
   held.fraction = 0.25;
-  const identify::ColumnMap map = identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/paderborn.toml");
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<double> before, after;
   int answered = 0, kept = 0, kept_by_two = 0;
   for (int s = 0; s < seeds; ++s) {
     const std::uint64_t seed = first + static_cast<std::uint64_t>(s);
-    const std::string path = tests::write_traction_log(fmt::format("hotcore_traction_{}.csv", getpid()), seed);
-    const auto logs = identify::logs_of(identify::read_table(path), map, std::nullopt);
-    std::filesystem::remove(path);
+    const auto logs = tests::traction_drive(fmt::format("hotcore_traction_{}.csv", getpid()), seed);
     const auto report = identify::discover(logs, std::nullopt, held);
     const double two_K = report.held_out->before.core_K, found_K = report.held_out->after.core_K;
     before.push_back(two_K);

@@ -16,6 +16,9 @@
 #include <string>
 #include <vector>
 
+#include "identify/log.hpp"
+#include "identify/table.hpp"
+
 namespace tests {
 
 /// Writes the log of drive `seed`, one to three hours at 2 Hz or 0.4 Hz, with the columns of maps/paderborn.toml, and
@@ -114,6 +117,15 @@ inline std::string write_traction_log(const std::string& name, std::uint64_t see
     for (int m = 0; m < masses; ++m) T[m] += dt * W[m] / J_per_K[m];
   }
   return path;
+}
+
+/// The same, as identify reads it: who calls gives a name of its own, since tests run side by side.
+inline std::vector<identify::Log> traction_drive(const std::string& name, std::uint64_t seed) {
+  const auto map = identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/paderborn.toml");
+  const std::string path = write_traction_log(name, seed);
+  auto logs = identify::logs_of(identify::read_table(path), map, std::nullopt);
+  std::filesystem::remove(path);
+  return logs;
 }
 
 }  // namespace tests
