@@ -121,7 +121,7 @@ std::string sentence(const Search& found, const Report& r) {
 }
 
 /// Why a log cannot bear a verdict; empty when it can.
-std::string too_poor(const Problem& problem, const Fit& base) {
+std::string too_poor(const Problem& problem) {
   double span = 0;
   for (const Bins& log : problem.logs) {
     if (log.missing_share > 0.35)
@@ -146,6 +146,11 @@ std::string too_poor(const Problem& problem, const Fit& base) {
                          log.name, static_cast<double>(std::max(housing, core)), static_cast<double>(least));
   }
   if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
+  return "";
+}
+
+/// Shorter than the housing's time constant? Empty when not.
+std::string too_short(const Problem& problem, const Fit& base, const Search& found) {
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
   const auto time_constant_s = [&](const Fit& f) {
@@ -163,13 +168,12 @@ std::string too_poor(const Problem& problem, const Fit& base) {
     const Fit alone = fit(one, {});
     if (alone.x.size() > 0 && determines(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
   }
+  // Two resistors that miss much may see no cooling, or a slow one, where the causes found let it be seen.
+  const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
+  if (explains && determines(problem, found.chosen.fit))
+    housing_s = std::min(housing_s, time_constant_s(found.chosen.fit));
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
-  // Two resistors that miss much may see no cooling at all where a cause lets it be seen.
-  if (all < housing_s && !determines(problem, base)) {
-    const Fit better = best_alone(problem);
-    if (determines(problem, better)) housing_s = std::min(housing_s, time_constant_s(better));
-  }
   if (all < housing_s) {
     const bool known = problem.belief.known || determines(problem, base);
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
@@ -400,13 +404,14 @@ Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::Moto
   if (problem.any_core())
     report.reasoning.push_back(
         fmt::format("Noise of a winding reading: {:.2f} K white from its differences.", problem.noise.core_white_K));
-  std::string poor = too_poor(problem, base);
+  std::string poor = too_poor(problem);
   Search found;
   const bool veto_asked = held.fraction > 0 || !held.logs.empty();
   bool vetoed = false;
   if (poor.empty()) {
     found = search(problem);
-    poor = suspicion(problem, found, logs, motor);
+    poor = too_short(problem, base, found);
+    if (poor.empty()) poor = suspicion(problem, found, logs, motor);
     const std::string refused =
         veto_asked && !found.chosen.fit.chosen.empty() ? veto(problem, found.base.fit, found.chosen.fit) : "";
     vetoed = !refused.empty();
