@@ -136,7 +136,11 @@ std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& f, doub
   std::vector<ParameterLine> out;
   const Eigen::VectorXd sd = f.std_errors();
   for (int i = 0; i < base_count; ++i) {
-    ParameterLine line{base_names[i], stated_unit(problem, base_units[i], base_scales[i]), std::exp(f.x[i]), 0, false,
+    ParameterLine line{base_names[i],
+                       stated_unit(problem, base_units[i], base_scales[i]),
+                       std::exp(f.x[i]),
+                       0,
+                       false,
                        f.at_bound[static_cast<std::size_t>(i)]};
     const double of_log = sd[i] * inflation;
     line.std_error = stated_error(line.value, line.value * std::min(of_log, 10.0));
@@ -168,8 +172,8 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
   if (f.x.size() == 0) {
     throw wire::pc::UserError(wire::pc::Exit::unusable,
                               problem.logs.front().name +
-                                  ": no motor near this sheet could be so heated and stay so cool; check the current's "
-                                  "unit, whether columns are swapped, and --motor.");
+                                  ": no motor near this sheet could be so heated and stay so cool; check the units of "
+                                  "current and time, whether columns are swapped, and --motor.");
   }
   report.fit_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";

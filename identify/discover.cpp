@@ -179,6 +179,8 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
+  if (found.verdict == Verdict::adequate && !problem.belief.known && !base_lines(problem, base, 1)[1].determined)
+    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", all);
   return "";
 }
 
@@ -211,16 +213,21 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
   return std::max(std::sqrt(square), 3 * rated_A);
 }
 
+constexpr const char* in_milliseconds =
+    "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
+    "time_s=COLUMN:ms.";
+
 /// What a fit misses over what noise alone would leave.
 double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
 
-/// Two columns swapped, or a temperature in Fahrenheit? Then two resistors, or one cause, on the columns read otherwise
-/// leave less than the best cause does on these. Empty when nothing helps.
+/// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
+/// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
-  const double as_it_stands = excess(fit(problem, {})), explained = excess(fit(problem, best.chosen, {&best}));
+  const Fit two = fit(problem, {});
+  const double as_it_stands = excess(two), explained = excess(fit(problem, best.chosen, {&best}));
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
     const double left = excess(fit(read, chosen));
     return left + clearly < explained && left < 0.25 * as_it_stands;
@@ -236,6 +243,18 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
     if (leaves_less(problem_of(swapped, motor), {}))
       return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
              "swapped; map them with --column.";
+  }
+  // Both masses as large as they may be: a motor that answers far too slowly.
+  const auto at_most = [&](Eigen::Index i, double believed) {
+    return two.at_bound[static_cast<std::size_t>(i)] && std::exp(two.x[i]) > believed;
+  };
+  if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K)) {
+    std::vector<Log> faster = logs;
+    for (Log& log : faster) {
+      for (double& t : log.of(Role::time)) t *= 1e-3;
+    }
+    const Problem read = problem_of(faster, motor);
+    if (leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen)) return in_milliseconds;
   }
   // A column that is ever below 50 would be below 10 degC: no room where motors are measured.
   const auto may_be_fahrenheit = [&](Role role) {
@@ -276,6 +295,10 @@ constexpr double heaviest_winding = 1.8;
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
+  // Without a sheet a motor a thousand times as slow fits as well. A winding of 17 minutes in a housing of 28 hours is
+  // none: a traction machine of 50 kW warms through within minutes and settles within hours.
+  const Physical two = physical(found.base.fit.x);
+  if (two.R1_K_per_W * two.C1_J_per_K > 1e3 && two.R2_K_per_W * two.C2_J_per_K > 1e5) return in_milliseconds;
   if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;

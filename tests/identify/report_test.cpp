@@ -237,6 +237,14 @@ TEST(BadInput, ShorterThanTheHousingsTimeConstant) {
   refused(spoilt([](auto&, int row) { return row < 1200; }), "less than the housing's time constant");
 }
 
+TEST(BadInput, TimeInMilliseconds) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto in_ms = [](auto& row, int number) { return row[0] = std::to_string(number * 100), true; };
+  refused(spoilt(in_ms), "check the units of current and time");
+  const Outcome without_sheet = run(spoilt(in_ms));
+  EXPECT_NE(without_sheet.out.find("--column time_s=COLUMN:ms"), std::string::npos) << without_sheet.out;
+}
+
 TEST(BadInput, FortyPercentMissing) {
   std::mt19937 random(4);
   refused(spoilt([&](auto&, int) { return random() % 10 >= 4; }), "40 % of the readings or rows are missing");
@@ -341,6 +349,14 @@ identify::Report foretold(std::uint64_t seed) {
   held.fraction = 0.25;
   return identify::discover(tests::traction_drive("hotcore_drive_" + std::to_string(seed) + ".csv", seed), std::nullopt,
                             held);
+}
+
+TEST(Traction, AMinuteSaysNothingOfAMotorWithoutASheet) {
+  auto logs = tests::traction_drive("hotcore_minute.csv", 44);
+  for (auto& column : logs[0].columns) column.resize(std::min<std::size_t>(column.size(), 120));
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_NE(report.sentence.find("does not come near where it settles"), std::string::npos) << report.sentence;
 }
 
 TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
