@@ -298,7 +298,10 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   // Without a sheet a motor a thousand times as slow fits as well. A winding of 17 minutes in a housing of 28 hours is
   // none: a traction machine of 50 kW warms through within minutes and settles within hours.
   const Physical two = physical(found.base.fit.x);
-  if (two.R1_K_per_W * two.C1_J_per_K > 1e3 && two.R2_K_per_W * two.C2_J_per_K > 1e5) return in_milliseconds;
+  const auto lines = base_lines(problem, found.base.fit, std::max(1.0, found.base.fit.ratio()));
+  if (std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
+      two.R1_K_per_W * two.C1_J_per_K > 1e3 && two.R2_K_per_W * two.C2_J_per_K > 1e5)
+    return in_milliseconds;
   if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
