@@ -22,7 +22,7 @@ constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
 constexpr std::size_t least_look_bins = 6000;    // of twice as many, looks see every two as one
-constexpr double least_slow_K = 0.02;            // of a sensor: less wander hides behind a thermistor's steps
+constexpr double least_slow_K = 0.02;            // below it a thermistor's slow noise hides behind its steps
 constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: the moment between two rows
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
@@ -629,7 +629,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   const bool unrested = problem.noise.idle_s == 0;
   const double small_part = unrested ? margins.small_part_unrested : margins.small_part;
   out.mostly = rules_parts && (left.gain < margins.remains || out.explains > margins.dominance * left.gain ||
-                               out.after_K < std::max(least_slow_K, small_part * out.before_K));
+                               out.after_K < small_part * out.before_K);
   out.nearly = rules_parts && unrested && out.after_K < margins.small_part_unseen * out.before_K;
   return out;
 }
