@@ -5,25 +5,11 @@
 #include <cmath>
 
 #include "identify/replay.hpp"
+#include "identify/whitening.hpp"
 
 namespace identify {
 namespace {
 
-/// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
-/// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
-constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
-/// When in its row's interval a dense winding was read, or the current: anywhere in it, this standard deviation.
-const double ordinary_moment_share = 1 / std::sqrt(12.0);
-/// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
-/// deviation.
-const double ordinary_uneven_share = 1 / std::sqrt(3.0);
-/// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
-/// host-sim's default motor: a standard deviation is one of these more or less.
-constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
-/// Of the heat, where the current squared is its mean over the heat: a standard deviation. The current that host-sim
-/// records says -0.5 to 0.4 percent more heat than the plant's joules, and down to -1.3 with load at top speed
-/// (designed, hidden motor 4110).
-constexpr double ordinary_load_share = 0.002;
 /// In the middle of what catalogues have (maxon, of 5 to 200 W: R1 0.03..1.4 of R2, C1 0.02..0.6 of C2).
 constexpr double usual_R1_share = 0.2, usual_C1_share = 0.11;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
@@ -111,90 +97,6 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   }
   return m;
 }
-
-/// The whitening filter of one channel: residual = white/sqrt(n) + wander + disturbance, the latter two first-order
-/// processes. A Kalman filter predicts these; what is left over, divided by its standard deviation, is white.
-struct Whitener {
-  double keep, keep_disturbed, wander2, disturbance2, white2;
-  double P, P_both, P_disturbed;
-  double gain = 0, gain_disturbed = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
-
-  static Whitener housing(const Noise& n, double step_s) {
-    return {n, n.housing_white_K, n.housing_slow_K, n.disturbance_K, step_s};
-  }
-  static Whitener core(const Noise& n, double step_s) {
-    return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
-  }
-
-  void reading(double n) {
-    const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + 1e-8;
-    gain = a / S;
-    gain_disturbed = b / S;
-    weight = 1 / std::sqrt(S);
-    P -= gain * a;
-    P_both -= gain * b;
-    P_disturbed -= gain_disturbed * b;
-  }
-  void step() {
-    P = keep * keep * P + (1 - keep * keep) * wander2;
-    P_both *= keep * keep_disturbed;
-    P_disturbed = keep_disturbed * keep_disturbed * P_disturbed + (1 - keep_disturbed * keep_disturbed) * disturbance2;
-  }
-
- private:
-  Whitener(const Noise& n, double white_K, double slow_K, double disturbance_K, double step_s)
-      : keep(std::exp(-step_s / n.slow_s)),
-        keep_disturbed(std::exp(-step_s / n.disturbance_s)),
-        wander2(slow_K * slow_K),
-        disturbance2(disturbance_K * disturbance_K),
-        white2(white_K * white_K),
-        P(wander2),
-        P_both(0),
-        P_disturbed(disturbance2) {}
-};
-
-/// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
-/// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
-struct Averaged {
-  static constexpr std::size_t most = 4;
-  std::vector<Leeway> effects;  // whitened
-  Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
-  double log_determinant = 0;
-
-  explicit Averaged(const Problem& problem) : effects(problem.leeway) {
-    const auto n = static_cast<Eigen::Index>(effects.size());
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(n, n);
-    for (std::size_t l = 0; l < problem.logs.size() && n > 0; ++l) {
-      const Bins& log = problem.logs[l];
-      whiten(Whitener::housing(problem.noise, log.width_s), log, &Bin::housing_n, &Leeway::housing_K, l, sum);
-      whiten(Whitener::core(problem.noise, log.width_s), log, &Bin::core_n, &Leeway::core_K, l, sum);
-    }
-    inverse = sum.inverse();
-    log_determinant = std::log(sum.determinant());
-  }
-
- private:
-  void whiten(Whitener w, const Bins& log, float Bin::*readings, std::vector<std::vector<double>> Leeway::*channel,
-              std::size_t l, Eigen::MatrixXd& sum) {
-    const auto n = static_cast<Eigen::Index>(effects.size());
-    Eigen::VectorXd wander = Eigen::VectorXd::Zero(n), disturbance = wander, s = wander;
-    for (std::size_t k = 0; k < log.bins.size(); ++k) {
-      if (log.bins[k].*readings > 0) {
-        w.reading(static_cast<double>(log.bins[k].*readings));
-        for (Eigen::Index i = 0; i < n; ++i) {
-          double& K = (effects[static_cast<std::size_t>(i)].*channel)[l][k];
-          s[i] = K = (K - wander[i] - disturbance[i]) * w.weight;
-        }
-        wander += w.gain / w.weight * s;
-        disturbance += w.gain_disturbed / w.weight * s;
-        sum += s * s.transpose();
-      }
-      w.step();
-      wander *= w.keep;
-      disturbance *= w.keep_disturbed;
-    }
-  }
-};
 
 template <int N>
 struct Sums {
@@ -416,12 +318,6 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   return out;
 }
 
-/// How far apart two simulations of one log are, `times` over.
-std::vector<double> apart_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
-  for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
-  return moved;
-}
-
 /// Where a cause starts whose parameters stand from `at` on: near nothing, and once far from it where it is nonlinear
 /// in them and has more than one valley.
 std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector<Coordinate>& c, std::size_t at) {
@@ -468,15 +364,6 @@ double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s
     if (sum < least) least = sum, out_s = delay_s;
   }
   return out_s;
-}
-
-/// The motor that a fit found, without its causes.
-Fit bare(const Fit& f) {
-  Fit out = f;
-  out.chosen.clear();
-  out.x.resize(f.x.size() - f.cause_coordinates());
-  out.x << f.x.head(base_count), f.x.tail(out.x.size() - base_count);
-  return out;
 }
 
 }  // namespace
@@ -570,85 +457,6 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   x.head(base_count) << x[1] + std::log(usual_R1_share), x[1], x[3] + std::log(usual_C1_share), x[3];
   Fit usual = fitted_from(x);
   return usual.cost < best.cost ? usual : best;
-}
-
-std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
-  const Fit two_resistors = bare(motor);
-  const Physical p = physical(two_resistors.x);
-  const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  // Short: they show the slope, and early is the reverse of late; in sharp bursts a delay shows it in hundredths.
-  constexpr double lag_s = 0.2, delay_s = 0.01;
-  // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
-  const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
-    const Edit e = cause_of(c).edit;
-    return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
-  });
-  const Fit& prompt = sensor ? two_resistors : motor;
-  const auto later_by = [&](const char* cause, double by_s) {
-    Fit out = prompt;
-    const Eigen::Index shared = base_count + prompt.cause_coordinates();
-    out.chosen.push_back({cause_named(cause), -1});
-    out.x.resize(prompt.x.size() + 1);
-    out.x << prompt.x.head(shared), by_s, prompt.x.tail(prompt.x.size() - shared);
-    return out;
-  };
-  const Fit late = later_by("sensor_lag", lag_s), delayed = later_by("clock_delay", delay_s);
-  Fit framed = two_resistors;
-  framed.chosen = {{cause_named("third_mass"), -1}};
-  framed.x.resize(two_resistors.x.size() + 2);
-  framed.x << two_resistors.x.head(base_count),
-      std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
-      std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W),
-      two_resistors.x.tail(two_resistors.x.size() - base_count);
-  framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
-  Problem uneven = problem;
-  uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
-  Leeway lateness, frame, phases, moment;
-  phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
-    const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
-                   held = replayed(problem, framed, l), even = replayed(problem, motor, l),
-                   warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l);
-    const Replayed& at_once = sensor ? plain : even;
-    const double moment_s = problem.logs[static_cast<std::size_t>(l)].interval_s * ordinary_moment_share;
-    lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
-    lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.core_K.push_back(apart_K(after.core_degC, at_once.core_degC, moment_s / delay_s));
-    frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
-    frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
-    phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
-    phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
-  }
-  std::vector<Leeway> out = {lateness, frame};
-  if (problem.uneven_per_A2 > 0) out.push_back(phases);
-  if (problem.noise.core_slow_K > 0) out.push_back(moment);
-  return out;
-}
-
-Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
-  Problem bent = problem;
-  double sum_A2 = 0, sum_A4 = 0;
-  for (const Bins& log : problem.logs) {
-    for (const Bin& bin : log.bins) {
-      const double A2 = bin.input[thermal::Drive::current_A2];
-      sum_A2 += A2;
-      sum_A4 += A2 * A2;
-    }
-  }
-  for (Bins& log : bent.logs) {
-    for (Bin& bin : log.bins) {
-      double& A2 = bin.input[thermal::Drive::current_A2];
-      if (sum_A4 > 0) A2 *= 1 + ordinary_load_share * A2 * sum_A2 / sum_A4;
-    }
-  }
-  Leeway out;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
-    const Replayed plain = replayed(problem, two_resistors, l), moved = replayed(bent, two_resistors, l);
-    out.housing_K.push_back(apart_K(moved.housing_degC, plain.housing_degC));
-    out.core_K.push_back(apart_K(moved.core_degC, plain.core_degC));
-  }
-  return out;
 }
 
 double cost_of_noise(const Problem& problem) {

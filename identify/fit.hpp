@@ -46,18 +46,6 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
-/// What no motor is without: a sensor that is not quite on the housing, so that its reading comes early or late by
-/// seconds; a frame that takes a share of the housing's capacity; where the rotor stands under load, phases that share
-/// their heat better or worse than was assumed; and a row whose current and winding were not read at one moment, which
-/// shows where every row has a winding's temperature: hundredths of a second looked like a hot spot or a delay there.
-/// Causes are to be ranked by more than that. By the best fit at hand: where something is missing, that of two
-/// resistors alone is no motor.
-std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor);
-
-/// Heat that goes otherwise with load than the recorded current's square says, as current sensors and sampling have it.
-/// A housing known to hundredths of a kelvin would take it for copper that warms otherwise, and so for another R1.
-Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors);
-
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.
 double cost_of_noise(const Problem& problem);

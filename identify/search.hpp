@@ -5,7 +5,7 @@
 // stands clear; several sets are as good (a tie); something is missing and no known cause explains it; too poor to say.
 #pragma once
 
-#include "identify/fit.hpp"
+#include "identify/candidates.hpp"
 
 namespace identify {
 
@@ -56,15 +56,6 @@ struct Margins {
   double disturbed_K = 0.06;
 };
 
-struct Candidate {
-  Fit fit;
-  double gain = 0;       // twice the logarithm of its evidence over the baseline's
-  double ratio = 0;      // rms of whitened residuals, both channels
-  double explained = 0;  // share of the baseline's excess misfit that it takes away
-  bool chosen = false;
-  bool tied = false;  // as good as the best; where two resistors are adequate, likelier than they are
-};
-
 enum class Verdict { adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient };
 const char* word(Verdict verdict);
 
@@ -79,11 +70,6 @@ struct Search {
   Verdict verdict = Verdict::insufficient;
   std::vector<std::string> steps;  // the reasoning in plain words
 };
-
-std::vector<std::string> ids_of(const std::vector<Chosen>& chosen);
-
-/// Of two resistors and every cause alone the one that follows the logs best.
-Fit best_alone(const Problem& problem);
 
 /// `without`: ids left out of the table (tests take the truth away and expect "unknown").
 Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {});

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "identify/baseline.hpp"
+#include "identify/leeway.hpp"
 #include "identify/replay.hpp"
 #include "identify/structure.hpp"
 #include "identify/table.hpp"

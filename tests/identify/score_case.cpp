@@ -9,6 +9,7 @@
 
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
+#include "identify/leeway.hpp"
 #include "identify/table.hpp"
 
 namespace tests {

@@ -15,6 +15,7 @@
 #include "identify/baseline.hpp"
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
+#include "identify/leeway.hpp"
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"

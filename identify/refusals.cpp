@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+#include "identify/refusals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identify/baseline.hpp"
+#include "identify/units.hpp"
+
+namespace identify {
+namespace {
+
+constexpr const char* in_milliseconds =
+    "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
+    "time_s=COLUMN:ms.";
+
+/// What a fit misses over what noise alone would leave.
+double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
+
+/// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
+/// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
+std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
+                            const std::optional<wire::pc::MotorFile>& motor) {
+  constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
+  // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
+  const Fit two = fit(problem, {});
+  const double as_it_stands = excess(two), explained = excess(fit(problem, best.chosen, {&best}));
+  const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
+    const double left = excess(fit(read, chosen));
+    return left + clearly < explained && left < 0.25 * as_it_stands;
+  };
+  const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
+    return log.has(Role::current) && log.has(Role::speed) &&
+           std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(),
+                       [](double w) { return std::abs(w) > 0; });
+  });
+  if (turns && !problem.heated_by_power()) {
+    std::vector<Log> swapped = logs;
+    for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
+    if (leaves_less(problem_of(swapped, motor), {}))
+      return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
+             "swapped; map them with --column.";
+  }
+  // Both masses as large as they may be: a motor that answers far too slowly.
+  const auto at_most = [&](Eigen::Index i, double believed) {
+    return two.at_bound[static_cast<std::size_t>(i)] && std::exp(two.x[i]) > believed;
+  };
+  if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K)) {
+    std::vector<Log> faster = logs;
+    for (Log& log : faster) {
+      for (double& t : log.of(Role::time)) t *= 1e-3;
+    }
+    const Problem read = problem_of(faster, motor);
+    if (leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen)) return in_milliseconds;
+  }
+  // A column that is ever below 50 would be below 10 degC: no room where motors are measured.
+  const auto may_be_fahrenheit = [&](Role role) {
+    return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
+      return log.has(role) && std::none_of(log.of(role).begin(), log.of(role).end(), [](double x) { return x < 50; });
+    });
+  };
+  const Unit degF = *unit_named("degF");
+  const std::vector<Role> together[] = {{Role::housing}, {Role::core}, {Role::housing, Role::core}};
+  for (const std::vector<Role>& roles : together) {
+    if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit)) continue;
+    std::vector<Log> converted = logs;
+    std::string columns;
+    for (const Role role : roles) {
+      columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
+      for (Log& log : converted) {
+        for (double& reading : log.of(role)) reading = degF.factor * (reading + degF.offset);
+      }
+    }
+    const Problem read = problem_of(converted, motor);
+    if (leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen))
+      return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
+                         columns);
+  }
+  return "";
+}
+
+/// With the two temperatures swapped, does one cause leave no more than the best does as they stand?
+bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
+                             const std::optional<wire::pc::MotorFile>& motor) {
+  for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
+  return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
+}
+
+/// C1 over C2: in catalogues 0.6 at most (maxon, of 5 to 200 W), three times as far allowed as for a belief.
+constexpr double heaviest_winding = 1.8;
+
+}  // namespace
+
+std::string too_poor(const Problem& problem) {
+  double span = 0;
+  for (const Bins& log : problem.logs) {
+    if (log.missing_share > 0.35)
+      return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
+                         100 * log.missing_share);
+    if (log.gap_share > 0.3)
+      return fmt::format("{}: gaps make up {:.0f} % of its time; record it again.", log.name, 100 * log.gap_share);
+    double low = 1e300, high = -1e300;
+    for (const Bin& bin : log.bins) {
+      const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+      if (!std::isnan(T)) low = std::min(low, T), high = std::max(high, T);
+    }
+    span = std::max(span, high - low);
+  }
+  // Four parameters and two initial temperatures follow any few readings; some must be left to judge by.
+  for (const Bins& log : problem.logs) {
+    float housing = 0, core = 0;
+    for (const Bin& bin : log.bins) housing += bin.housing_n, core += bin.core_n;
+    constexpr float least = 20;
+    if (log.housing_step_K == 0 && std::max(housing, core) < least)
+      return fmt::format("{}: {:.0f} readings of a temperature are too few, {:.0f} the least; read it more often.",
+                         log.name, static_cast<double>(std::max(housing, core)), static_cast<double>(least));
+  }
+  if (span < 2) return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
+  return "";
+}
+
+std::string too_short(const Problem& problem, const Fit& base, const Search& found) {
+  // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
+  // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
+  const auto time_constant_s = [&](const Fit& f) {
+    const Physical p = physical(f.x);
+    return p.R2_K_per_W * p.C2_J_per_K;
+  };
+  const auto determines = [](const Problem& by, const Fit& f) {
+    const auto lines = base_lines(by, f, std::max(1.0, f.ratio()));
+    return lines[1].determined && lines[3].determined;
+  };
+  double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
+    Problem one = problem;
+    one.logs = {problem.logs[l]};
+    const Fit alone = fit(one, {});
+    if (alone.x.size() > 0 && determines(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
+  }
+  // Two resistors that miss much may see no cooling, or a slow one, where the causes found let it be seen.
+  const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
+  if (explains && determines(problem, found.chosen.fit))
+    housing_s = std::min(housing_s, time_constant_s(found.chosen.fit));
+  double all = 0;
+  for (const Bins& log : problem.logs) all += log.duration_s();
+  if (all < housing_s) {
+    const bool known = problem.belief.known || determines(problem, base);
+    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
+                       known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
+  }
+  if (found.verdict == Verdict::adequate && !problem.belief.known && !base_lines(problem, base, 1)[1].determined)
+    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", all);
+  return "";
+}
+
+std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+                      const std::optional<wire::pc::MotorFile>& motor) {
+  // Without a sheet a motor a thousand times as slow fits as well. A winding of 17 minutes in a housing of 28 hours is
+  // none: a traction machine of 50 kW warms through within minutes and settles within hours.
+  const Physical two = physical(found.base.fit.x);
+  const auto lines = base_lines(problem, found.base.fit, std::max(1.0, found.base.fit.ratio()));
+  if (std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
+      two.R1_K_per_W * two.C1_J_per_K > 1e3 && two.R2_K_per_W * two.C2_J_per_K > 1e5)
+    return in_milliseconds;
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
+  // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
+  const Fit& best = found.singles.front().fit;
+  Eigen::Index at = base_count;
+  for (const Chosen& c : best.chosen) {
+    const Cause& cause = cause_of(c);
+    if (cause.edit == Edit::delay && best.at_bound[static_cast<std::size_t>(at)]) {
+      return fmt::format(
+          "Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
+          cause.parameters[0].high);
+    }
+    at += static_cast<Eigen::Index>(cause.parameters.size());
+  }
+  const std::string misread = misread_columns(problem, best, logs, motor);
+  if (!misread.empty()) return misread;
+  // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which. So does a
+  // motor that is more than two masses; read the other way round it does not follow the load.
+  const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
+                                [](const Bins& log) { return log.has_core && log.has_housing; });
+  const Physical p = physical(found.chosen.fit.x);
+  if (both && p.C1_J_per_K > heaviest_winding * p.C2_J_per_K && follows_as_well_swapped(problem, best, logs, motor)) {
+    return fmt::format(
+        "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
+        "housing_degC are swapped.",
+        p.C1_J_per_K / p.C2_J_per_K);
+  }
+  return "";
+}
+
+}  // namespace identify

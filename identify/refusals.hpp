@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// Why a log gets no verdict: one plain sentence each, empty where there is no reason.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "identify/search.hpp"
+
+namespace identify {
+
+/// Why a log cannot bear a verdict; empty when it can.
+std::string too_poor(const Problem& problem);
+
+/// Shorter than the housing's time constant? Empty when not.
+std::string too_short(const Problem& problem, const Fit& base, const Search& found);
+
+/// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
+std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+                      const std::optional<wire::pc::MotorFile>& motor);
+
+}  // namespace identify

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// What is left of a residual when the noise that can be foretold, and what a fit averages over, is taken out: white.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <vector>
+
+#include "identify/problem.hpp"
+
+namespace identify {
+
+/// The whitening filter of one channel: residual = white/sqrt(n) + wander + disturbance, the latter two first-order
+/// processes. A Kalman filter predicts these; what is left over, divided by its standard deviation, is white.
+struct Whitener {
+  double keep, keep_disturbed, wander2, disturbance2, white2;
+  double P, P_both, P_disturbed;
+  double gain = 0, gain_disturbed = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
+
+  static Whitener housing(const Noise& n, double step_s) {
+    return {n, n.housing_white_K, n.housing_slow_K, n.disturbance_K, step_s};
+  }
+  static Whitener core(const Noise& n, double step_s) {
+    return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
+  }
+
+  void reading(double n) {
+    const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + 1e-8;
+    gain = a / S;
+    gain_disturbed = b / S;
+    weight = 1 / std::sqrt(S);
+    P -= gain * a;
+    P_both -= gain * b;
+    P_disturbed -= gain_disturbed * b;
+  }
+  void step() {
+    P = keep * keep * P + (1 - keep * keep) * wander2;
+    P_both *= keep * keep_disturbed;
+    P_disturbed = keep_disturbed * keep_disturbed * P_disturbed + (1 - keep_disturbed * keep_disturbed) * disturbance2;
+  }
+
+ private:
+  Whitener(const Noise& n, double white_K, double slow_K, double disturbance_K, double step_s)
+      : keep(std::exp(-step_s / n.slow_s)),
+        keep_disturbed(std::exp(-step_s / n.disturbance_s)),
+        wander2(slow_K * slow_K),
+        disturbance2(disturbance_K * disturbance_K),
+        white2(white_K * white_K),
+        P(wander2),
+        P_both(0),
+        P_disturbed(disturbance2) {}
+};
+
+/// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
+/// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
+struct Averaged {
+  static constexpr std::size_t most = 4;
+  std::vector<Leeway> effects;  // whitened
+  Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
+  double log_determinant = 0;
+
+  explicit Averaged(const Problem& problem) : effects(problem.leeway) {
+    const auto n = static_cast<Eigen::Index>(effects.size());
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(n, n);
+    for (std::size_t l = 0; l < problem.logs.size() && n > 0; ++l) {
+      const Bins& log = problem.logs[l];
+      whiten(Whitener::housing(problem.noise, log.width_s), log, &Bin::housing_n, &Leeway::housing_K, l, sum);
+      whiten(Whitener::core(problem.noise, log.width_s), log, &Bin::core_n, &Leeway::core_K, l, sum);
+    }
+    inverse = sum.inverse();
+    log_determinant = std::log(sum.determinant());
+  }
+
+ private:
+  void whiten(Whitener w, const Bins& log, float Bin::*readings, std::vector<std::vector<double>> Leeway::*channel,
+              std::size_t l, Eigen::MatrixXd& sum) {
+    const auto n = static_cast<Eigen::Index>(effects.size());
+    Eigen::VectorXd wander = Eigen::VectorXd::Zero(n), disturbance = wander, s = wander;
+    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+      if (log.bins[k].*readings > 0) {
+        w.reading(static_cast<double>(log.bins[k].*readings));
+        for (Eigen::Index i = 0; i < n; ++i) {
+          double& K = (effects[static_cast<std::size_t>(i)].*channel)[l][k];
+          s[i] = K = (K - wander[i] - disturbance[i]) * w.weight;
+        }
+        wander += w.gain / w.weight * s;
+        disturbance += w.gain_disturbed / w.weight * s;
+        sum += s * s.transpose();
+      }
+      w.step();
+      wander *= w.keep;
+      disturbance *= w.keep_disturbed;
+    }
+  }
+};
+
+}  // namespace identify
