@@ -2,7 +2,6 @@
 #include "identify/candidates.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "identify/parallel.hpp"
 

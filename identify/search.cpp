@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
@@ -44,9 +43,10 @@ std::string listed(const std::vector<Chosen>& chosen) {
   return out;
 }
 
-/// A further cause must be worth it where the model may be off by twice that. Both chosen on gain's seeds 501 to 508
-/// and 601 to 612: at once that, false second causes of 508 and 607 still passed; with the board's fit at twice that,
-/// the winding's error on other logs was a seventh to a third larger (score designed-sparse, seeds 770 and 880).
+/// A further cause must be worth it where the model may be off by twice what no model follows. Both chosen on gain's
+/// seeds 501 to 508 and 601 to 612: at once that, false second causes of 508 and 607 still passed; with the board's fit
+/// at twice that, the winding's error on other logs was a seventh to a third larger (score designed-sparse, seeds 770
+/// and 880).
 constexpr double doubted = 2;
 
 /// Why the best pair is not believed; empty when it is.
