@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
+#include "identify/leeway.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -83,27 +83,6 @@ void add_extended(const Problem& problem, const Fit& f, Report& report, std::siz
   }
 }
 
-Problem first_part(const Problem& problem, double fraction) {
-  Problem out = problem;
-  for (Bins& log : out.logs) {
-    const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
-    log.bins.resize(std::max<std::size_t>(cut, 2));
-  }
-  return out;
-}
-
-Problem last_part(const Problem& problem, double fraction) {
-  Problem out = problem;
-  for (Bins& log : out.logs) {
-    const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
-    for (std::size_t k = 0; k < cut; ++k) {
-      log.bins[k].housing_n = log.bins[k].core_n = 0;
-      log.bins[k].housing_degC = log.bins[k].core_degC = missing;
-    }
-  }
-  return out;
-}
-
 double stated_error(double value, double std_error) {
   // Whole boards whose winding is read all the time: R1 and C1 came out 1.2 and 1.4 percent too small (gain --clean
   // --thermocouple, seeds 5101 to 5106, both excitations) with errors of 0.2 to 0.6; teeth are no node of the model.
@@ -165,17 +144,19 @@ std::string core_refusal(const Problem& problem, const Fit& f) {
       std::exp(std::min(sd, 6.0)));
 }
 
-Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
-                   const std::optional<wire::pc::MotorFile>& motor, Report& report) {
-  const auto start = std::chrono::steady_clock::now();
-  const Fit f = fit(problem, {});
+Fit fit_baseline(const Problem& problem) {
+  Fit f = fit(problem, {});
   if (f.x.size() == 0) {
     throw wire::pc::UserError(wire::pc::Exit::unusable,
                               problem.logs.front().name +
                                   ": no motor near this sheet could be so heated and stay so cool; check the units of "
                                   "current and time, whether columns are swapped, and --motor.");
   }
-  report.fit_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return f;
+}
+
+void judge_baseline(const Problem& problem, const Fit& f, const std::vector<Log>& logs,
+                    const std::optional<wire::pc::MotorFile>& motor, Report& report) {
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";
   for (const Bins& log : problem.logs) {
     for (const std::string& note : log.notes)
@@ -192,7 +173,7 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
   }
   report.structure = structure(problem, f);
   report.baseline_rmse = rmse_of(problem, f);
-  const double inflation = std::max(1.0, report.structure.housing.ratio);
+  const double inflation = std::max(1.0, report.structure.residual.ratio);
   report.baseline = base_lines(problem, f, inflation);
   report.core_refusal = core_refusal(problem, f);
   const auto loose = directions(f);
@@ -204,10 +185,10 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
     inflated.sd *= inflation;
     report.loose.push_back(in_words(inflated));
   }
-  const bool residual = report.structure.housing.ratio < 1.3;
+  const bool residual = report.structure.residual.ratio < 1.3;
   report.converged = f.settled && residual && identifiable;
   report.checks = {fmt::format("gradient: {} after {} iterations", f.settled ? "at rest" : "NOT at rest", f.iterations),
-                   fmt::format("residual: {:.2f} times the noise{}", report.structure.housing.ratio,
+                   fmt::format("residual: {:.2f} times the noise{}", report.structure.residual.ratio,
                                residual ? "" : ", so the model is not right yet"),
                    identifiable ? "identifiability: all four parameters are determined by this data"
                                 : fmt::format("identifiability: {} of 4 directions are not determined by this data",
@@ -219,10 +200,10 @@ Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
         {fmt::format("resistance grows with temperature ({:.5f} per K)", problem.belief.copper_per_K),
          report.baseline_rmse});
     Problem constant = problem_of(logs, motor, 0.0);
-    report.variants.push_back({"resistance constant", rmse_of(constant, fit(constant, {}))});
+    constant.leeway = ordinary_leeway(constant, f);
+    report.variants.push_back({"resistance constant", rmse_of(constant, fit(constant, {}, {&f}))});
   }
   add_plots(problem, f, "", report);
-  return f;
 }
 
 }  // namespace identify

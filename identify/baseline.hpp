@@ -13,10 +13,14 @@ struct HoldOut {
   int draws = 1000;       // of the bootstrap
 };
 
-/// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots).
-Fit judge_baseline(const Problem& problem, const std::vector<Log>& logs,
-                   const std::optional<wire::pc::MotorFile>& motor, Report& report);
+/// Two resistors fitted by themselves. Throws UserError (unusable) where no such motor can be.
+Fit fit_baseline(const Problem& problem);
 
+/// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots) from `fit`.
+void judge_baseline(const Problem& problem, const Fit& fit, const std::vector<Log>& logs,
+                    const std::optional<wire::pc::MotorFile>& motor, Report& report);
+
+/// Errors over all logs, K; `each`: of every log as well.
 Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
 
 /// Each log without its last `fraction`; and each whole, but with the readings of that part alone.

@@ -16,7 +16,7 @@ namespace {
 using thermal::Boundary;
 using thermal::Drive;
 
-/// 36,000 take a search 8 to 17 s on one core (README), so these a minute and a half at most.
+/// 36,000 take a search 12 to 19 s on one core (README), so these a minute and a half at most.
 constexpr double most_bins = 200000;
 /// Of the current with its ripple, rms: without it there is less, but for what two sensors differ by.
 constexpr double most_sampled_share = 1.1;
@@ -193,6 +193,23 @@ void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const I
   }
 }
 
+double first_reading(const Bins& log, double Bin::*reading, int most, double within_s = 30) {
+  double sum = 0;
+  int n = 0;
+  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < within_s; ++k) {
+    if (!std::isnan(log.bins[k].*reading)) sum += log.bins[k].*reading, ++n;
+  }
+  return n > 0 ? sum / n : missing;
+}
+
+void find_start(Bins& out) {
+  out.start_core_degC = first_reading(out, &Bin::core_degC, 1);
+  out.start_housing_degC = first_reading(out, &Bin::housing_degC, 5);
+  // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
+  if (std::isnan(out.start_housing_degC))
+    out.start_housing_degC = first_reading(out, &Bin::housing_degC, 1, out.duration_s());
+}
+
 void find_idle(Bins& out) {
   const auto heat = [](const Bin& bin) {
     return std::max(bin.input[Drive::current_A2], std::abs(bin.input[Drive::power_W]));
@@ -266,8 +283,16 @@ Bins bins_of(const Log& log, double finest_s) {
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
   add_ahead(out, log, in);
+  find_start(out);
   find_idle(out);
   return out;
+}
+
+void forget_readings(Bins& log, std::size_t before) {
+  for (std::size_t k = 0; k < std::min(before, log.bins.size()); ++k) {
+    log.bins[k].housing_n = log.bins[k].core_n = 0;
+    log.bins[k].housing_degC = log.bins[k].core_degC = missing;
+  }
 }
 
 Bins merged(const Bins& log, std::size_t together) {

@@ -49,9 +49,10 @@ struct Bins {
   double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
-  double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences
-  double missing_share = 0, gap_share = 0, housing_step_K = 0;  // as in Log
-  double uneven_per_A2 = 0;                                     // as in Problem
+  double start_housing_degC = missing, start_core_degC = missing;  // as the first readings say; NaN: none
+  double housing_noise_K = 0, core_noise_K = 0;                    // of one raw reading, from its differences
+  double missing_share = 0, gap_share = 0, housing_step_K = 0;     // as in Log
+  double uneven_per_A2 = 0;                                        // as in Problem
   std::vector<std::string> notes;
 
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
@@ -64,6 +65,9 @@ Bins bins_of(const Log& log, double finest_s);
 /// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. `sampled_A`: amplitude
 /// with the sign of its torque, without ripple where that is known. Speed mechanical.
 void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, double speed_rad_per_s);
+
+/// Takes the readings before a bin away; what they said of the start stays.
+void forget_readings(Bins& log, std::size_t before);
 
 /// Every `together` bins as one.
 Bins merged(const Bins& log, std::size_t together);

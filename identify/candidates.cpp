@@ -20,8 +20,6 @@ Candidate candidate(const Candidate& base, Fit f) {
   Candidate c;
   c.gain = base.fit.surprise() - f.surprise();
   c.ratio = f.ratio();
-  const double before = base.ratio * base.ratio - 1, after = c.ratio * c.ratio - 1;
-  c.explained = before > 0 ? 1 - std::max(0.0, after) / before : 0;
   c.fit = std::move(f);
   return c;
 }

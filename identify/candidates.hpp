@@ -14,9 +14,8 @@ namespace identify {
 
 struct Candidate {
   Fit fit;
-  double gain = 0;       // twice the logarithm of its evidence over the baseline's
-  double ratio = 0;      // rms of whitened residuals, both channels
-  double explained = 0;  // share of the baseline's excess misfit that it takes away
+  double gain = 0;   // twice the logarithm of its evidence over the baseline's
+  double ratio = 0;  // rms of whitened residuals, both channels
   bool chosen = false;
   bool tied = false;  // as good as the best; where two resistors are adequate, likelier than they are
 };

@@ -103,7 +103,7 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
                                    S(0)};
   };
   const auto add_node = [&](const S& capacity) {
-    set.nodes[set.node_count] = {capacity, 1e30f};
+    set.nodes[set.node_count] = {capacity, {}};
     return set.node_count++;
   };
   switch (cause.edit) {

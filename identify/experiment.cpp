@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "thermal/indices.hpp"
 
@@ -15,6 +14,9 @@ namespace {
 using thermal::Drive;
 
 constexpr double spare_K = 10;  // below the winding's limit: identification must not burn what it measures
+/// A protocol that is too hot is tried with less, down to a quarter of the current, a twentieth of the heat.
+constexpr double weaker = 0.88;
+constexpr int most_tries = 12;
 
 struct Protocol {
   const char* why;
@@ -73,11 +75,15 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
   Bins out;
   out.name = "experiment";
   out.width_s = std::min(2.0, 4 * like.width_s);
-  out.has_housing = true;
+  out.has_housing = like.has_housing;
+  // As often as the log was read.
+  const double housing_n = like.has_housing ? out.width_s / like.interval_s : 0;
   out.has_core = problem.any_core();
   double sink = 0;
   for (const Bin& bin : like.bins) sink += bin.input.boundary_degC[0] / static_cast<double>(like.bins.size());
   double since_core_s = 0;
+  out.start_housing_degC = out.has_housing ? sink : missing;
+  out.start_core_degC = out.has_core ? sink : missing;
   for (const ProfileStep& step : steps) {
     for (double t = 0; t < step.seconds; t += out.width_s) {
       Bin bin{};
@@ -89,7 +95,7 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
       const double share = static_cast<double>(out.bins.size()) * out.width_s / 1200;
       if (like.has_neighbour && share > 0.33 && share < 0.66) in[thermal::Boundary::neighbour] = sink + 30;
       bin.housing_at = bin.core_at = 0.5f;
-      bin.housing_n = static_cast<float>(10 * out.width_s);
+      bin.housing_n = static_cast<float>(housing_n);
       bin.idle = step.current_A == 0 && step.speed_rad_per_s == 0;
       since_core_s += out.width_s;
       if (out.has_core && since_core_s >= 30) bin.core_n = 1, since_core_s = 0;
@@ -99,24 +105,26 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
   return out;
 }
 
-/// Fills the readings with what `truth` says from rest; returns the hottest winding, degC.
-double fill(Problem& trial, const Fit& truth) {
-  Bins& log = trial.logs.front();
-  for (Bin& bin : log.bins) bin.housing_degC = bin.core_degC = 0;
+/// `truth`, starting the trial from rest.
+Fit resting(const Problem& trial, const Fit& truth) {
+  const Bins& log = trial.logs.front();
   Fit at_rest = truth;
   const double sink = log.bins.front().input.boundary_degC[0];
   const Eigen::Index shared = base_count + truth.cause_coordinates();
   at_rest.x.conservativeResize(shared + per_log_count);
   at_rest.x[shared] = sink;
   at_rest.x[shared + 1] = 0;
-  const Replayed r = replayed(trial, at_rest, 0);
-  double hottest = -1e300;
+  return at_rest;
+}
+
+/// Fills the readings with what `truth` says from rest.
+void fill(Problem& trial, const Fit& truth) {
+  const Replayed r = replayed(trial, resting(trial, truth), 0);
+  Bins& log = trial.logs.front();
   for (std::size_t k = 0; k < log.bins.size(); ++k) {
-    log.bins[k].housing_degC = r.housing_degC[k];
-    log.bins[k].core_degC = log.bins[k].core_n > 0 ? r.core_degC[k] : std::numeric_limits<double>::quiet_NaN();
-    hottest = std::max(hottest, r.core_degC[k]);
+    log.bins[k].housing_degC = log.bins[k].housing_n > 0 ? r.housing_degC[k] : missing;
+    log.bins[k].core_degC = log.bins[k].core_n > 0 ? r.core_degC[k] : missing;
   }
-  return hottest;
 }
 
 }  // namespace
@@ -144,25 +152,28 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     double largest = 0;
     for (const ProfileStep& step : protocol.steps) largest = std::max(largest, std::abs(step.current_A));
     double least = 1e300, amps = std::min(problem.rms_A, most_A / largest);
-    bool cool = true;
+    Problem trial = problem;
+    trial.noise = found.noise;
+    const auto stays_cool = [&](const Candidate* truth) {  // under every one of the models
+      const double hottest = hottest_degC(trial, resting(trial, truth->fit), 0);
+      return hottest < problem.belief.winding_max_degC - spare_K;
+    };
+    bool cool = false;
+    for (int i = 0; i < most_tries && !cool; ++i) {
+      trial.logs = {bins_for(problem, protocol.steps, amps, top)};
+      cool = std::all_of(tied.begin(), tied.end(), stays_cool);
+      if (!cool) amps *= weaker;
+    }
+    if (!cool) continue;
     for (const Candidate* truth : tied) {
-      Problem trial = problem;
-      trial.noise = found.noise;
-      // Under every one of the models.
-      cool = false;
-      for (int i = 0; i < 12 && !cool; ++i) {
-        trial.logs = {bins_for(problem, protocol.steps, amps, top)};
-        cool = fill(trial, truth->fit) < problem.belief.winding_max_degC - spare_K;
-        if (!cool) amps *= 0.88;
-      }
-      if (!cool) break;
+      fill(trial, truth->fit);
       for (const Candidate* rival : tied) {
         if (rival == truth) continue;
         const Fit f = fit(trial, rival->fit.chosen);
         least = std::min(least, 2 * f.misfit);
       }
     }
-    if (cool && least > best_D) {
+    if (least > best_D) {
       best_D = least;
       best.profile.clear();
       for (const ProfileStep& s : protocol.steps)

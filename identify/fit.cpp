@@ -10,22 +10,11 @@
 namespace identify {
 namespace {
 
-/// In the middle of what catalogues have (maxon, of 5 to 200 W: R1 0.03..1.4 of R2, C1 0.02..0.6 of C2).
-constexpr double usual_R1_share = 0.2, usual_C1_share = 0.11;
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
 
 struct Coordinate {
   double start, prior, sd, low, high;
 };
-
-double first_reading(const Bins& log, double Bin::*reading, int most, double within_s = 30) {
-  double sum = 0;
-  int n = 0;
-  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < within_s; ++k) {
-    if (!std::isnan(log.bins[k].*reading)) sum += log.bins[k].*reading, ++n;
-  }
-  return n > 0 ? sum / n : missing;
-}
 
 int coordinates_of(const std::vector<Chosen>& chosen) {
   int n = 0;
@@ -51,10 +40,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
     }
   }
   for (const Bins& log : problem.logs) {
-    const double core = first_reading(log, &Bin::core_degC, 1);
-    double housing = first_reading(log, &Bin::housing_degC, 5);
-    // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
-    if (std::isnan(housing)) housing = first_reading(log, &Bin::housing_degC, 1, log.duration_s());
+    const double core = log.start_core_degC, housing = log.start_housing_degC;
     const double at = std::isnan(housing) ? core : housing;
     const double sink = log.bins.front().input.boundary_degC[0];
     const double known = std::isnan(at) ? sink : at;
@@ -73,8 +59,8 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   Model<S> m;
   auto& set = m.set;
   set.node_count = 2;
-  set.nodes[0] = {exp(x[2]), 155.0f};
-  set.nodes[1] = {exp(x[3]), 1e30f};
+  set.nodes[0] = {exp(x[2]), {}};
+  set.nodes[1] = {exp(x[3]), {}};
   set.link_count = 2;
   set.links[0] = {0, 1, thermal::LinkLaw::constant, exp(-x[0]), S(0)};
   set.links[1] = {1, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, exp(-x[1]), S(0)};
@@ -308,7 +294,6 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
   out.narrowing = narrowed.ldlt().vectorD().array().abs().log().sum();
   out.x = x;
-  out.gradient = g;
   out.information = H;
   out.from_data = now.information;
   out.cost = cost;
@@ -364,6 +349,11 @@ double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s
     if (sum < least) least = sum, out_s = delay_s;
   }
   return out_s;
+}
+
+/// Where a log's own coordinates stand.
+Eigen::Index initial_of(const Problem& problem, const Fit& f, int log) {
+  return f.x.size() - per_log_count * (static_cast<Eigen::Index>(problem.logs.size()) - log);
 }
 
 }  // namespace
@@ -454,7 +444,7 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   Fit best = fitted_from(x);
   if (warm.size() > 0 || problem.belief.known) return best;
   // What two resistors alone are fitted best by may have no winding to speak of.
-  x.head(base_count) << x[1] + std::log(usual_R1_share), x[1], x[3] + std::log(usual_C1_share), x[3];
+  x.head(base_count) << x[1] + std::log(R1_of_R2.middle), x[1], x[3] + std::log(C1_of_C2.middle), x[3];
   Fit usual = fitted_from(x);
   return usual.cost < best.cost ? usual : best;
 }
@@ -510,11 +500,11 @@ Model<double> model_of(const Problem& problem, const Fit& f, int log) {
 
 Replayed replayed(const Problem& problem, const Fit& f, int l) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
-  const Eigen::Index own =
-      f.x.size() - per_log_count * static_cast<Eigen::Index>(problem.logs.size() - static_cast<std::size_t>(l));
+  const Eigen::Index own = initial_of(problem, f, l);
   const auto model = model_of(problem, f, l);
   Replayed out;
-  Whitener white = Whitener::housing(problem.noise, log.width_s);
+  Whitener white =
+      log.has_housing ? Whitener::housing(problem.noise, log.width_s) : Whitener::core(problem.noise, log.width_s);
   double wander = 0, disturbance = 0;
   replay<4>(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
     const Bin& bin = log.bins[k];
@@ -523,9 +513,10 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
     out.housing_residual_K.push_back(bin.housing_degC - y2);
     out.core_residual_K.push_back(bin.core_degC - y1);
     double w = missing;
-    if (bin.housing_n > 0) {
-      white.reading(static_cast<double>(bin.housing_n));
-      w = (bin.housing_degC - y2 - wander - disturbance) * white.weight;
+    if (const double n = static_cast<double>(log.has_housing ? bin.housing_n : bin.core_n); n > 0) {
+      white.reading(n);
+      const double residual_K = log.has_housing ? bin.housing_degC - y2 : bin.core_degC - y1;
+      w = (residual_K - wander - disturbance) * white.weight;
       wander += white.gain * w / white.weight;
       disturbance += white.gain_disturbed * w / white.weight;
     }
@@ -535,6 +526,22 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
     disturbance *= white.keep_disturbed;
   });
   return out;
+}
+
+double hottest_degC(const Problem& problem, const Fit& f, int l) {
+  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+  auto part = model_of(problem, f, l);
+  const int hot = part.hot_node;
+  const Eigen::Index initial = initial_of(problem, f, l);
+  double hottest = -1e300;
+  part.hot_node = -1;  // a reading is then of one node, not of both
+  for (const int node : {part.core, hot}) {
+    if (node < 0) continue;
+    part.core = node;
+    replay<4>(part, log, f.x[initial] + f.x[initial + 1], f.x[initial],
+              [&](std::size_t, double, double degC) { hottest = std::max(hottest, degC); });
+  }
+  return hottest;
 }
 
 Error error_of(const std::vector<double>& residual_K) {

@@ -17,8 +17,7 @@ inline constexpr int base_count = 4, per_log_count = 2;
 
 struct Fit {
   std::vector<Chosen> chosen;
-  Eigen::VectorXd x;  // coordinates
-  Eigen::VectorXd gradient;
+  Eigen::VectorXd x;            // coordinates
   Eigen::MatrixXd information;  // of data and prior (Gauss-Newton Hessian)
   Eigen::MatrixXd from_data;    // of the data alone
   double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
@@ -58,9 +57,12 @@ Fit transferred(const Problem& other, const Fit& from);
 struct Replayed {
   std::vector<double> housing_degC, core_degC;              // as the sensors would read
   std::vector<double> housing_residual_K, core_residual_K;  // measured - simulated, NaN where nothing was measured
-  std::vector<double> whitened;                             // housing residual whitened, NaN likewise
+  std::vector<double> whitened;  // residual of the housing (of a winding read alone), whitened, NaN likewise
 };
 Replayed replayed(const Problem& problem, const Fit& fit, int log);
+
+/// The most that any part of the winding becomes, degC.
+double hottest_degC(const Problem& problem, const Fit& fit, int log);
 
 /// Root mean square and worst of the residuals; NaN when there is no reading.
 struct Error {

@@ -153,7 +153,8 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
   const Answers before = answers_of(before_set, trust_of(problem, baseline), truth, work, most_A, burst_A),
                 after = answers_of(truth, trust, truth, work, most_A, burst_A);
   using thermal::direct_A;
-  return Gain{.overshoot_before_K = before.overshoot_K,
+  return Gain{.like = {},
+              .overshoot_before_K = before.overshoot_K,
               .overshoot_after_K = after.overshoot_K,
               .burst_s_before = before.burst_s,
               .burst_s_after = after.burst_s,

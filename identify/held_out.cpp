@@ -12,6 +12,10 @@ namespace {
 
 constexpr double block_s = 60;  // longer than a housing sensor's slow error (20 s), so that blocks are strangers
 constexpr double veto_share = 0.25;
+constexpr std::size_t least_blocks = 4;  // drawn from fewer, chance looks smaller than it is
+constexpr int least_draws = 100;         // for the 2.5th of a hundred to be one of them
+
+constexpr int veto_draws = 400;
 
 /// Sums of squared residuals of one block under both models.
 struct Block {
@@ -75,7 +79,7 @@ void add_interval(const Problem& problem, const Fit& base, const Fit& extended, 
   out.winding = problem.any_core();
   const auto blocks = blocks_of(problem, base, extended, out.winding);
   out.blocks = static_cast<int>(blocks.size());
-  if (blocks.size() < 4 || draws < 100) return;
+  if (blocks.size() < least_blocks || draws < least_draws) return;
   const Resampled r = resampled(blocks, draws);
   out.before_95 = middle_95(r.before_K);
   out.after_95 = middle_95(r.after_K);
@@ -83,32 +87,34 @@ void add_interval(const Problem& problem, const Fit& base, const Fit& extended, 
 
 }  // namespace
 
-HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
-                       const Fit& base, const Fit& extended, Report& report) {
+Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held) {
+  Problem out = unseen_by(fitted, held.fraction > 0 ? logs : held.logs);
+  for (std::size_t l = 0; held.fraction > 0 && l < out.logs.size(); ++l)
+    forget_readings(out.logs[l], fitted.logs[l].bins.size());
+  return out;
+}
+
+HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& base, const Fit& extended,
+                       Report& report) {
   HeldOut out;
   if (held.fraction > 0) {
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
-    const Problem last = last_part(whole, held.fraction);
-    out.before = rmse_of(last, base);
-    out.after = rmse_of(last, extended);
-    add_interval(last, base, extended, held.draws, out);
+    out.before = rmse_of(unseen, base);
+    out.after = rmse_of(unseen, extended);
+    add_interval(unseen, base, extended, held.draws, out);
     return out;
   }
   out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
-  // Scales and belief are those the parameters were found with; only the inputs are new.
-  Problem other = whole, unseen = problem_of(held.logs, motor, whole.belief.copper_per_K);
-  unseen.warm_unevenly(whole.uneven_per_A2);
-  other.logs = std::move(unseen.logs);
   // What is of one of the fitted logs (a fan) is not of these.
   Fit elsewhere = extended;
   for (Chosen& c : elsewhere.chosen) c.log = -1;
-  const Fit before = transferred(other, base), after = transferred(other, elsewhere);
-  out.before = rmse_of(other, before, &out.each_before);
-  out.after = rmse_of(other, after);
+  const Fit before = transferred(unseen, base), after = transferred(unseen, elsewhere);
+  out.before = rmse_of(unseen, before, &out.each_before);
+  out.after = rmse_of(unseen, after);
   for (const Log& log : held.logs) out.names.push_back(log.name);
-  add_interval(other, before, after, held.draws, out);
-  add_plots(other, before, " (not seen by the fit)", report);
-  add_extended(other, after, report, report.plots.size() - held.logs.size());
+  add_interval(unseen, before, after, held.draws, out);
+  add_plots(unseen, before, " (not seen by the fit)", report);
+  add_extended(unseen, after, report, report.plots.size() - held.logs.size());
   return out;
 }
 
@@ -116,9 +122,10 @@ std::string veto(const Problem& problem, const Fit& base, const Fit& extended) {
   const Problem first = first_part(problem, veto_share), last = last_part(problem, veto_share);
   const Fit two = fit(first, {}, {&base}), more = fit(first, extended.chosen, {&extended});
   if (two.x.size() == 0 || more.x.size() == 0) return "";
-  const auto blocks = blocks_of(last, two, more, problem.any_core());
-  if (blocks.size() < 4) return "";
-  const Resampled r = resampled(blocks, 400);
+  auto blocks = blocks_of(last, two, more, problem.any_core());
+  if (blocks.size() < least_blocks) blocks = blocks_of(last, two, more, false);
+  if (blocks.size() < least_blocks) return "";
+  const Resampled r = resampled(blocks, veto_draws);
   // A sixth of the draws lie more than a standard deviation below the middle.
   if (!(r.growth_K[r.growth_K.size() / 6] > 0)) return "";
   const auto middle = [](const std::vector<double>& v) { return v[v.size() / 2]; };

@@ -7,10 +7,13 @@
 
 namespace identify {
 
-/// Errors of both models on the data held out, with a bootstrap interval over blocks of a minute. Logs that were held
-/// out are added to the report's plots.
-HeldOut score_held_out(const Problem& whole, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
-                       const Fit& base, const Fit& extended, Report& report);
+/// What `fitted` has not seen of `logs`, or the logs held out.
+Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held);
+
+/// Errors of both models on that, with a bootstrap interval over blocks of a minute. Logs that were held out are added
+/// to the report's plots.
+HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& base, const Fit& extended,
+                       Report& report);
 
 /// Why the extended model must not be believed: fitted to the first three quarters of each log it misses the last by
 /// more than the two-resistor model does, and by more than chance explains. Empty: it may.

@@ -285,7 +285,16 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
     apply_unit(rest.substr(colon + 1), own_name(role), where, Exit::usage, source.factor, source.offset);
     source.unit_said = true;
   }
-  map.columns[role] = source;
+  if (!map.columns.emplace(role, source).second)
+    throw UserError(Exit::usage, where + ": " + own_name(role) + " was given a column before; give each role one.");
+}
+
+Log without_last(Log log, double fraction) {
+  const auto& t = log.of(Role::time);
+  const auto end = std::lower_bound(t.begin(), t.end(), (1 - fraction) * t.back());
+  const auto rows = static_cast<std::size_t>(end - t.begin());
+  for (std::vector<double>& column : log.columns) column.resize(std::min(column.size(), rows));
+  return log;
 }
 
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {

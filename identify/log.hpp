@@ -78,6 +78,9 @@ struct Log {
   bool has(Role r) const { return !of(r).empty(); }
 };
 
+/// The rows before the last `fraction` of the log's time.
+Log without_last(Log log, double fraction);
+
 /// The logs in a table: one, or one a session. Throws UserError (unusable) in one sentence.
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor);
 

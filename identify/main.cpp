@@ -34,7 +34,7 @@ struct Arguments {
   std::vector<std::string> logs, columns, truths;
   std::string motor, map, hold_out, json, html, write_model, write_baseline;
   bool explain = false;
-  int draws = 1000;
+  int draws = identify::HoldOut{}.draws;
 };
 
 /// `--column A=B C=D` is how people write it; to the parser what follows the first is a log.
@@ -52,6 +52,12 @@ std::vector<Log> read(const std::string& path, const identify::ColumnMap& map,
   return identify::logs_of(identify::read_table(path), map, motor ? std::optional(motor->motor) : std::nullopt);
 }
 
+/// However they are written.
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code none;
+  return a == b || std::filesystem::equivalent(a, b, none);
+}
+
 identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& paths, const identify::ColumnMap& map,
                            const std::optional<wire::pc::MotorFile>& motor) {
   identify::HoldOut out;
@@ -64,7 +70,7 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
     out.fraction = fraction;
     return out;
   }
-  std::erase(paths, what);
+  std::erase_if(paths, [&](const std::string& path) { return same_file(path, what); });
   if (paths.empty()) throw UserError(Exit::usage, "--hold-out " + what + ": no log is left to fit; give another one.");
   out.logs = read(what, map, motor);
   return out;
@@ -79,7 +85,9 @@ std::vector<std::string> truth_in(const std::string& path) {
   }
   std::vector<std::string> ids;
   for (const auto& cause : json["causes"])
-    ids.push_back(cause.is_string() ? cause.get<std::string>() : cause.value("id", std::string("?")));
+    ids.push_back(cause.is_string()   ? cause.get<std::string>()
+                  : cause.is_object() ? cause.value("id", std::string("?"))
+                                      : "?");
   std::sort(ids.begin(), ids.end());
   return ids;
 }
@@ -138,13 +146,15 @@ int answer(Arguments a) {
   }
   identify::ColumnMap map;
   if (!a.map.empty()) map = identify::read_map(a.map);
-  for (const std::string& column : a.columns) identify::add_column(map, column);
+  identify::ColumnMap said;
+  for (const std::string& column : a.columns) identify::add_column(said, column);
+  for (const auto& [role, source] : said.columns) map.columns[role] = source;
   if (!a.truths.empty()) return score(a, map, motor);
   identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
   held.draws = a.draws;
   std::vector<Log> logs;
   for (const std::string& path : a.logs) {
-    if (std::count(a.logs.begin(), a.logs.end(), path) > 1)
+    if (std::count_if(a.logs.begin(), a.logs.end(), [&](const auto& other) { return same_file(path, other); }) > 1)
       throw UserError(Exit::usage, path + ": this log is named twice and would count twice; name it once.");
     for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
   }
@@ -183,7 +193,8 @@ int main(int argc, char** argv) {
   app.add_option("--bootstrap", a.draws,
                  "how often the held-out error is redrawn for its interval; below 100: no interval")
       ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
+      ->check(CLI::Range(0, 100000))
+      ->needs("--hold-out");
   app.add_option("--json", a.json, "write the answer as JSON; - for standard output, and nothing else there");
   app.add_option("--html", a.html, "write a page with pictures");
   app.add_option("--write-model", a.write_model,

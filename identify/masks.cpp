@@ -155,7 +155,7 @@ void note_missing_input(Log& log) {
   std::vector<Role> input = {Role::power};
   if (!log.has(Role::power)) input = {log.has(Role::current) ? Role::current : Role::iq};
   if (input.front() == Role::iq && log.has(Role::id)) input.push_back(Role::id);
-  if (input.front() == Role::iq && !log.has(Role::id))
+  if (log.has(Role::iq) && input.size() == 1 && input.front() == Role::iq)
     log.notes.push_back("id_A is missing; all current is taken to make torque.");
   for (const Role role : input) {
     const double share = missing_of_input(log, role);

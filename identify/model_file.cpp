@@ -28,6 +28,21 @@ Eigen::MatrixXd doubts(const Fit& f) {
   return f.covariance(false) * (widened * widened);
 }
 
+/// Of the logs, and of before and after their cooling changed, the one that heats most and cools least: a board cannot
+/// know whether the fan that a log had runs.
+Model<double> hottest_model_of(const Problem& problem, const Fit& f) {
+  Model<double> hottest;
+  double most_K_per_drive = -1;
+  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
+    Model<double> m = model_of(problem, f, l);
+    double& sink_W_per_K = m.set.links[m.sink_link].conductance_W_per_K;
+    if (m.cooling_changes) sink_W_per_K *= std::min(1.0, m.cooling_factor);
+    const double K_per_drive = m.set.sources[0].gain / sink_W_per_K;
+    if (K_per_drive > most_K_per_drive) most_K_per_drive = K_per_drive, hottest = m;
+  }
+  return hottest;
+}
+
 /// First coordinate of a chosen cause that edits this; -1: none does.
 int coordinate_of(const Fit& f, Edit edit) {
   int at = base_count;
@@ -69,7 +84,7 @@ void place_sensor(const Model<double>& m, double share, thermal::HeatSet<double>
 }  // namespace
 
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
-  const Model<double> m = model_of(problem, f, 0);
+  const Model<double> m = hottest_model_of(problem, f);
   thermal::HeatSet<double> set = m.set;
   place_sensor(m, cautious_share(m, f), set);
   for (int i = 0; i < set.node_count; ++i) {
@@ -92,21 +107,22 @@ thermal::Trust trust_of(const Problem& problem, const Fit& f, const thermal::Tru
     power += unit(at) * most_K / (1 + f.x[at] * most_K);
   }
   const auto together = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return a.dot(doubt * b); };
-  const auto share = [](double variance, float at_least) {
-    return std::clamp(static_cast<float>(std::sqrt(std::max(0.0, variance))), at_least, 0.5f);
+  const auto deviation = [&](const Eigen::VectorXd& of, float at_least) {
+    return std::max(std::sqrt(std::max(0.0, together(of, of))), static_cast<double>(at_least));
   };
-  thermal::Trust trust = {share(together(power, power), least.power),
-                          share(together(unit(resistance), unit(resistance)), least.inner_resistance),
-                          share(together(unit(1), unit(1)), least.cooling)};
+  const double power_sd = deviation(power, least.power),
+               resistance_sd = deviation(unit(resistance), least.inner_resistance);
+  // The board spreads a doubt to first order, and that of more than a half is none.
+  const auto share = [](double sd) { return static_cast<float>(std::min(sd, 0.5)); };
   // More power is less capacity.
-  trust.correlation = static_cast<float>(std::clamp(
-      -together(power, unit(resistance)) / static_cast<double>(trust.power * trust.inner_resistance), -1.0, 1.0));
-  return trust;
+  const double correlation = -together(power, unit(resistance)) / (power_sd * resistance_sd);
+  return {share(power_sd), share(resistance_sd), share(deviation(unit(1), least.cooling)),
+          static_cast<float>(std::clamp(correlation, -1.0, 1.0))};
 }
 
 std::string heat_set_toml(const Problem& problem, const Fit& f, const std::string& sentence,
                           const thermal::Trust& trust) {
-  const Model<double> m = model_of(problem, f, 0);
+  const Model<double> m = hottest_model_of(problem, f);
   const thermal::HeatSet<double> set = heat_set_of(problem, f);
   std::string s = "# " + sentence + "\n";
   if (!problem.belief.known && !problem.heated_by_power())
@@ -148,7 +164,8 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   if (m.stalls)
     recording += fmt::format("stall_share = {:.6g}  # the board's three phase nodes hold it already\n", m.stall_share);
   if (m.cooling_changes)
-    recording += fmt::format("cooling_factor = {:.6g}\ncooling_from_s = {:.6g}\n", m.cooling_factor, m.cooling_from_s);
+    recording += fmt::format("cooling_factor = {:.6g}  # the lesser cooling is in the links\ncooling_from_s = {:.6g}\n",
+                             m.cooling_factor, m.cooling_from_s);
   if (!recording.empty()) s += "\n[recording]  # of this log, not of the motor\n" + recording;
   return s;
 }

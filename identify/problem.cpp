@@ -137,13 +137,15 @@ void rough_search(Problem& whole) {
       if (f.cost >= least || f.x.size() == 0) continue;
       least = f.cost;
       best = b;
-      // A housing that answers at once is fitted best by both masses as one, and no motor is so. In catalogues R1 is
-      // 0.03..1.4 of R2 and C1 0.02..0.6 of C2 (maxon, of 5 to 200 W); three times as far is allowed either way.
+      // A housing that answers at once is fitted best by both masses as one, and no motor is so.
       const Physical p = physical(f.x);
       best.R2_K_per_W = p.R2_K_per_W;
-      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / 1.8);
-      best.R1_K_per_W = std::clamp(p.R1_K_per_W, 0.01 * p.R2_K_per_W, 4.2 * p.R2_K_per_W);
-      best.C1_J_per_K = std::clamp(p.C1_J_per_K, 0.007 * best.C2_J_per_K, 1.8 * best.C2_J_per_K);
+      const auto believed = [](double value, const InCatalogues& share, double of) {
+        return std::clamp(value, share.least / beyond_catalogues * of, share.most * beyond_catalogues * of);
+      };
+      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / (C1_of_C2.most * beyond_catalogues));
+      best.R1_K_per_W = believed(p.R1_K_per_W, R1_of_R2, p.R2_K_per_W);
+      best.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, best.C2_J_per_K);
     }
   }
   if (least < 1e300) whole.belief = best;
@@ -315,6 +317,37 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
   if (!problem.heated_by_power()) warm_phases_unequally(problem);
   return problem;
+}
+
+Problem first_part(const Problem& problem, double fraction) {
+  Problem out = problem;
+  for (Bins& log : out.logs) {
+    const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
+    log.bins.resize(std::max<std::size_t>(cut, 2));
+  }
+  return out;
+}
+
+Problem last_part(const Problem& problem, double fraction) {
+  Problem out = problem;
+  for (Bins& log : out.logs) {
+    const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
+    forget_readings(log, cut);
+  }
+  return out;
+}
+
+Problem unseen_by(const Problem& fitted, const std::vector<Log>& logs) {
+  Problem out = fitted;
+  out.logs.clear();
+  out.leeway.clear();
+  out.uneven_per_A2 = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const std::size_t like = std::min(l, fitted.logs.size() - 1);
+    out.logs.push_back(bins_of(logs[l], fitted.logs[like].width_s));
+  }
+  if (!out.heated_by_power()) warm_phases_unequally(out);
+  return out;
 }
 
 }  // namespace identify

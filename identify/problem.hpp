@@ -13,6 +13,13 @@
 
 namespace identify {
 
+/// R1 over R2 and C1 over C2 in catalogues (maxon, of 5 to 200 W).
+struct InCatalogues {
+  double least, middle, most;
+};
+inline constexpr InCatalogues R1_of_R2{0.03, 0.2, 1.4}, C1_of_C2{0.02, 0.11, 0.6};
+inline constexpr double beyond_catalogues = 3;  // so many times as far is believed of a motor either way
+
 /// Where the fit starts and how far it may be off.
 struct Belief {
   bool known = false;  // a motor file was given; otherwise found from the data, and as good as unknown
@@ -63,5 +70,12 @@ struct Problem {
 /// search). `copper_per_K`: overrides the coefficient of the winding's resistance (0: constant).
 Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
                    std::optional<double> copper_per_K = std::nullopt);
+
+/// Each log without its last `fraction`; and each whole, but with the readings of that part alone.
+Problem first_part(const Problem& problem, double fraction);
+Problem last_part(const Problem& problem, double fraction);
+
+/// Logs that `fitted` has not seen, under what it believes and assumes: only the inputs and the readings are theirs.
+Problem unseen_by(const Problem& fitted, const std::vector<Log>& logs);
 
 }  // namespace identify

@@ -88,9 +88,6 @@ bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vecto
   return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
 }
 
-/// C1 over C2: in catalogues 0.6 at most (maxon, of 5 to 200 W), three times as far allowed as for a belief.
-constexpr double heaviest_winding = 1.8;
-
 }  // namespace
 
 std::string too_poor(const Problem& problem) {
@@ -184,7 +181,8 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
   const Physical p = physical(found.chosen.fit.x);
-  if (both && p.C1_J_per_K > heaviest_winding * p.C2_J_per_K && follows_as_well_swapped(problem, best, logs, motor)) {
+  if (both && p.C1_J_per_K > C1_of_C2.most * beyond_catalogues * p.C2_J_per_K &&
+      follows_as_well_swapped(problem, best, logs, motor)) {
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",

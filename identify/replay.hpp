@@ -106,16 +106,19 @@ void correct(const Model<S>& model, const Bins& log, const Splines& splines, std
   };
   for (int s = 0; s < model.set.source_count; ++s) take(model.set.sources[s].drive);
   take(Drive::speed_to_0_8);
+  // The current as it flowed then: to the nearest bin, where it only corrects.
+  const double latest = static_cast<double>(log.bins.size() - 1), nearest = std::round(place);
+  const Bin& then = log.bins[static_cast<std::size_t>(nearest < 0 ? 0 : nearest > latest ? latest : nearest)];
   if (model.offset)
     in[Drive::current_A2] +=
-        model.current_offset_A * (2 * bin.signed_A) + model.current_offset_A * model.current_offset_A;
-  if (model.uneven_per_A2 != 0) in[Drive::current_A2] += model.uneven_per_A2 * bin.uneven_A4;
-  const double a2 = bin.input[Drive::current_A2];
+        model.current_offset_A * (2 * then.signed_A) + model.current_offset_A * model.current_offset_A;
+  if (model.uneven_per_A2 != 0) in[Drive::current_A2] += model.uneven_per_A2 * then.uneven_A4;
+  const double a2 = then.input[Drive::current_A2];
   if (model.stalls && a2 > 0) {
     // What phases that warm unequally take more goes by the square of what heats them.
-    const S more = model.stall_share * (bin.stalled_A2 / a2) + 1.0;
+    const S more = model.stall_share * (then.stalled_A2 / a2) + 1.0;
     in[Drive::current_A2] =
-        more * (in[Drive::current_A2] + (more - 1.0) * (model.uneven_per_A2 + log.uneven_per_A2) * bin.uneven_A4);
+        more * (in[Drive::current_A2] + (more - 1.0) * (model.uneven_per_A2 + log.uneven_per_A2) * then.uneven_A4);
   }
   if (model.drifts) {
     in[Boundary::ambient] += model.drift_K_per_s * time_s;

@@ -73,9 +73,9 @@ struct Experiment {
   std::string why;
 };
 
-/// What a board would do on a motor like the extended model: before with the two-resistor fit, after with the
-/// extension.
+/// What a board would do on a motor as the model written for it: before with the two-resistor fit, after with that.
 struct Gain {
+  std::string like;                                           // the causes in that model
   double overshoot_before_K = 0, overshoot_after_K = 0;       // of the winding, in a push that outlasts its budget
   double burst_s_before = 0, burst_s_after = 0;               // that the board promises for the burst, from rest
   double continuous_A_before = 0, continuous_A_after = 0;     // that it promises for an hour
@@ -129,7 +129,6 @@ struct Report {
   std::string model_file;
   std::vector<std::string> reasoning;  // --explain
   std::vector<LogPlot> plots;
-  double fit_ms = 0;  // of the two-resistor model
 };
 
 std::string as_text(const Report& report, bool explain);

@@ -198,7 +198,7 @@ std::string where(const Report& r) {
                           w.mean_K > 0 ? "hotter than simulated" : "cooler than simulated"),
               escaped(w.goes_with)});
   }
-  s += "</table>\n" + paragraph(whiteness_words(r.structure.housing)) + "<table>" +
+  s += "</table>\n" + paragraph(whiteness_words(r.structure.residual)) + "<table>" +
        row({"residual correlates with", "correlation", "smoothed over"}, "th");
   for (const Relation& c : r.structure.relations)
     s += row({escaped(c.signal), fmt::format("{:+.2f}", c.correlation),

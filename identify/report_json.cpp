@@ -44,9 +44,9 @@ std::string as_json(const Report& r) {
   base["parameters"] = parameters(r.baseline);
   base["rmse_K"] = rms(r.baseline_rmse);
   base["worst_K"] = number(worst(r.baseline_rmse));
-  base["adequacy"] = {{"ratio", number(r.structure.housing.ratio)},
-                      {"white_p", number(r.structure.housing.white_p)},
-                      {"ljung_box_p", number(r.structure.housing.ljung_box_p)}};
+  base["adequacy"] = {{"ratio", number(r.structure.residual.ratio)},
+                      {"white_p", number(r.structure.residual.white_p)},
+                      {"ljung_box_p", number(r.structure.residual.ljung_box_p)}};
   base["where"] = ordered_json::array();
   for (const Wrong& w : r.structure.wrong) {
     base["where"].push_back({{"log", w.log},
@@ -121,8 +121,9 @@ std::string as_json(const Report& r) {
     out["experiment"] = {{"separates", r.experiment->separates}, {"profile", profile}, {"why", r.experiment->why}};
   }
   out["model_file"] = r.model_file.empty() ? ordered_json(nullptr) : ordered_json(r.model_file);
-  out["fit_ms"] = r.fit_ms;
-  return out.dump(2) + "\n";
+  out["reasoning"] = r.reasoning;
+  // A path or a column's name need not be UTF-8.
+  return out.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace identify

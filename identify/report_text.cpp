@@ -53,7 +53,7 @@ std::string variants(const Report& r) {
 }
 
 std::string where(const Report& r) {
-  std::string s = "\nWhere it is wrong\n  " + whiteness_words(r.structure.housing) + "\n";
+  std::string s = "\nWhere it is wrong\n  " + whiteness_words(r.structure.residual) + "\n";
   if (r.structure.wrong.empty()) s += "  no stretch stands out\n";
   for (const Wrong& w : r.structure.wrong) {
     s += fmt::format("  {}{:.0f}..{:.0f} s: {} is {:.2f} K {} than simulated; goes with {}\n",
@@ -147,7 +147,7 @@ std::string interval_words(const HeldOut& h) {
 }
 
 std::string whiteness_words(const Whiteness& w) {
-  if (w.ratio == 0) return "too few housing readings to tell whether the residual is noise";
+  if (w.ratio == 0) return "too few readings to tell whether the residual is noise";
   return fmt::format(
       "the residual is {:.2f} times the noise; a right model leaves one so unlike white noise with a chance of {:.2g} "
       "(cumulated periodogram) or {:.2g} (Ljung-Box)",
@@ -156,9 +156,9 @@ std::string whiteness_words(const Whiteness& w) {
 
 std::string gain_conditions(const Gain& g) {
   return fmt::format(
-      "a board that runs the two-resistor model, and one that runs the extended model, on a motor that is as the "
-      "extended model says; the push is {:.2f} A from rest, at {:.0f} rad/s, in {:.0f} degC",
-      g.burst_A, g.speed_rad_per_s, g.ambient_degC);
+      "a board that runs the two-resistor model, and one that runs the model with {}, on a motor that is as the "
+      "latter says; the push is {:.2f} A from rest, at {:.0f} rad/s, in {:.0f} degC",
+      g.like, g.burst_A, g.speed_rad_per_s, g.ambient_degC);
 }
 
 std::vector<GainLine> gain_lines(const Gain& g) {

@@ -208,11 +208,7 @@ Structure structure(const Problem& problem, const Fit& f) {
       find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K, 3 * slow_K, problem.noise.core_white_K,
                  all, out.wrong);
   }
-  if (!problem.logs.front().has_housing) {
-    whitened.clear();
-    for (const double r : residual) whitened.push_back(r / problem.noise.core_white_K);
-  }
-  out.housing = whiteness(whitened);
+  out.residual = whiteness(whitened);
   for (std::size_t s = 0; s < all.size(); ++s) {
     Relation best{all[s].name, 0, 0};
     for (const auto& [values, tau] :

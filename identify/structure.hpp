@@ -37,7 +37,7 @@ struct Loose {
 };
 
 struct Structure {
-  Whiteness housing;
+  Whiteness residual;
   std::vector<Relation> relations;  // strongest first
   std::vector<Wrong> wrong;         // largest first
 };

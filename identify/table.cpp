@@ -43,7 +43,7 @@ std::string whole_file(const std::string& path) {
   return text;
 }
 
-/// Cells of one line. Returns false when a quote is never closed.
+/// Cells of one line. Returns false when a quote is never closed, or something follows it in its cell.
 bool split(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
   std::size_t at = 0;
@@ -51,10 +51,13 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
     std::size_t start = at;
     while (start < line.size() && line[start] == ' ') ++start;
     if (start < line.size() && line[start] == '"') {
-      const std::size_t close = line.find('"', start + 1);
+      std::size_t close = line.find('"', start + 1);
+      while (close != std::string_view::npos && line.substr(close + 1, 1) == "\"")  // two of them stand for one
+        close = line.find('"', close + 2);
       if (close == std::string_view::npos) return false;
       cells.push_back(line.substr(start + 1, close - start - 1));
       at = std::min(line.find(separator, close), line.size());
+      if (!trimmed(line.substr(close + 1, at - close - 1)).empty()) return false;
     } else {
       const std::size_t end = std::min(line.find(separator, at), line.size());
       cells.push_back(trimmed(line.substr(at, end - at)));
@@ -188,12 +191,12 @@ Table read_table(const std::string& path) {
       refuse(line, fmt::format("{:.1f} MB without a line end; a table has one row a line: export the log again.",
                                static_cast<double>(row.size()) / 1e6));
     }
-    row = trimmed(row);
     if (row.find('\0') != std::string_view::npos)
       refuse(line, "a zero byte; this is not a text file: export the log as CSV.");
-    if (row.empty()) continue;
-    if (row.front() == '#') {
-      remark = trimmed(row.substr(1));
+    const std::string_view bare = trimmed(row);  // not the row itself: a tab may stand for an empty cell
+    if (bare.empty()) continue;
+    if (bare.front() == '#') {
+      remark = trimmed(bare.substr(1));
       continue;
     }
     if (table.names.empty()) {

@@ -140,8 +140,8 @@ TEST(Fit, WithTheTrueModelTheResidualIsWhite) {
   for (std::uint64_t seed = 1; seed <= 11; ++seed) {
     const Problem problem = problem_from(off_sheet(seed));
     const auto s = identify::structure(problem, identify::fit(problem, {}));
-    EXPECT_NEAR(s.housing.ratio, 1, 0.15) << seed;
-    white += s.housing.white_p > 0.001;
+    EXPECT_NEAR(s.residual.ratio, 1, 0.15) << seed;
+    white += s.residual.white_p > 0.001;
   }
   // The noise model comes from a few minutes of rest and is not exact; the test for whiteness is sharper than that.
   EXPECT_GE(white, 8);
@@ -152,8 +152,8 @@ TEST(Fit, WithHiddenHeatTheResidualIsNotWhiteAndTheStretchIsFound) {
   options.extra_housing_W = [](double t, double, double) { return t > 400 && t < 600 ? 3.0 : 0.0; };
   const Problem problem = problem_from(options);
   const auto s = identify::structure(problem, identify::fit(problem, {}));
-  EXPECT_GT(s.housing.ratio, 1.5);
-  EXPECT_LT(s.housing.white_p, 1e-6);
+  EXPECT_GT(s.residual.ratio, 1.5);
+  EXPECT_LT(s.residual.white_p, 1e-6);
   ASSERT_FALSE(s.wrong.empty());
   const auto hit = std::any_of(s.wrong.begin(), s.wrong.end(),
                                [](const auto& w) { return w.mean_K > 0 && w.from_s < 600 && w.to_s > 450; });

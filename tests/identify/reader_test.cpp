@@ -87,8 +87,9 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::time)[1], 1.5);
   EXPECT_DOUBLE_EQ(logs[0].of(Role::iq)[1], 2);
   EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
-  add_column(map, "housing_degC=T:degC");
-  EXPECT_DOUBLE_EQ(read(text, map)[0].of(Role::housing)[0], 50);
+  ColumnMap said;
+  add_column(said, "housing_degC=T:degC");
+  EXPECT_DOUBLE_EQ(read(text, said)[0].of(Role::housing)[0], 50);
   says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n"), "unknown unit 'Arms'");
 }
 

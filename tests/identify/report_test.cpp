@@ -117,7 +117,7 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   held.logs = bench_logs({unseen});
   identify::Report report;
   const auto base = identify::fit(problem, {}), extended = identify::fit(problem, {{cause, 0}});
-  const auto scored = identify::score_held_out(problem, motor, held, base, extended, report);
+  const auto scored = identify::score_held_out(identify::unseen_of(problem, {}, held), held, base, extended, report);
   EXPECT_LT(scored.after.core_K, 0.5);
   EXPECT_GT(scored.before.core_K, 2);
 }
@@ -179,8 +179,9 @@ TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
   logs[1].name = "the other";
   logs[1].of(identify::Role::speed).clear();
   const auto notes = identify::discover(logs, std::nullopt).notes;
-  EXPECT_EQ(std::count(notes.begin(), notes.end(),
-                       "the other: speed_rad_per_s is missing, which another log has; the rotor is taken to stand."),
+  EXPECT_EQ(std::count(
+                notes.begin(), notes.end(),
+                "the other: speed_rad_per_s is missing, which another log has; nothing in it is taken to go by speed."),
             1);
 }
 

@@ -199,8 +199,8 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.verdict = found.verdict;
   result.answer = found.tied;
   result.steps = found.steps;
-  result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f}, explained {:.2f};", log.motor, log.core_error_K,
-                               found.base.ratio, found.chosen.ratio, found.chosen.explained);
+  result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f};", log.motor, log.core_error_K, found.base.ratio,
+                               found.chosen.ratio);
   check_parameters(log, problem, found, result);
   if (options.separability) {
     const bool outside = identify::cause_named(result.truth.front()) < 0;
