@@ -83,7 +83,7 @@ Problem coarse(const Problem& problem, const Fit& best) {
 }
 
 /// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
-/// into a poor valley by what is missing.
+/// into a poor valley by what is missing. Of a long log those far behind are left as its longer bins show them.
 std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
                                   const std::vector<Candidate>& before) {
   const Problem rough = coarse(problem, base.fit);
@@ -96,12 +96,19 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
     fits[i] = fit(rough, alone, {known == before.end() ? &base.fit : &known->fit});
     Fit anew = fit(rough, alone);
     if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
-    if (fits[i].x.size() > 0 && shorter) fits[i] = fit(problem, alone, {&fits[i]});
   });
-  std::vector<Candidate> out;
-  for (Fit& f : fits) {
-    if (f.x.size() > 0) out.push_back(candidate(base, std::move(f)));
-  }
+  std::erase_if(fits, [](const Fit& f) { return f.x.size() == 0; });
+  Candidate rough_base = base;
+  if (shorter) rough_base.fit = fit(rough, {}, {&base.fit});
+  double most = 0;
+  for (const Fit& f : fits) most = std::max(most, rough_base.fit.surprise() - f.surprise());
+  std::vector<Candidate> out(fits.size());
+  in_parallel(fits.size(), [&](std::size_t i) {
+    out[i] = candidate(rough_base, std::move(fits[i]));
+    if (!shorter || out[i].gain < most - look_errs - look_errs_share * most) return;
+    Fit whole = fit(problem, out[i].fit.chosen, {&out[i].fit});
+    if (whole.x.size() > 0) out[i] = candidate(base, std::move(whole));
+  });
   sort(out);
   return out;
 }

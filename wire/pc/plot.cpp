@@ -48,14 +48,17 @@ std::string data_block(const std::string& name, const Curve& curve) {
     const std::size_t stretches = most_points / 2;
     for (std::size_t s = 0; s < stretches; ++s) {
       const std::size_t from = s * n / stretches, to = (s + 1) * n / stretches;
-      std::size_t low = from, high = from;
+      std::size_t low = to, high = to;
       bool gap = false;
       for (std::size_t i = from; i < to; ++i) {
-        if (!std::isfinite(curve.y[i])) gap = true;
-        if (!(curve.y[low] <= curve.y[i])) low = i;
-        if (!(curve.y[high] >= curve.y[i])) high = i;
+        if (!std::isfinite(curve.y[i])) {
+          gap = true;
+          continue;
+        }
+        if (low == to || curve.y[i] < curve.y[low]) low = i;
+        if (high == to || curve.y[i] > curve.y[high]) high = i;
       }
-      line(std::min(low, high));
+      if (low < to) line(std::min(low, high));
       if (low != high) line(std::max(low, high));
       if (gap) out += "\n";
     }
