@@ -113,6 +113,14 @@ HeatModel read_heat_model(const std::string& path) {
                     path, static_cast<int>(check.problem), check.index));
   }
 
+  // A board measures no power: such a winding would stay cold whatever flows, and nothing would be limited.
+  const bool heated = std::any_of(set.sources, set.sources + set.source_count, [](const thermal::Source<double>& s) {
+    using enum thermal::Drive;
+    return s.drive == current_A2 || s.drive == phase_a_A2 || s.drive == phase_b_A2 || s.drive == phase_c_A2;
+  });
+  if (!heated)
+    refuse(path + ": no current heats it, and a board measures no power; record the current and identify again.");
+
   HeatModel model{set, {}};
   if (const toml::table* trust = file["trust"].as_table()) {
     const std::string place = path + ": trust";
