@@ -105,6 +105,18 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
     says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
 }
 
+TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
+  const identify::Table table =
+      identify::read_table(file("note\ttime_s\tcurrent_A\tcore_degC\n\t0\t1\t\n\t1\t2\t20\n"));
+  EXPECT_EQ(table.names.size(), 4u);
+  EXPECT_EQ(table.rows(), 2u);
+}
+
+TEST(Reader, TextBehindAQuoteIsNotDropped) {
+  says(complaint(head + "\"1\"5,1,20\n"), "line 2");
+  EXPECT_DOUBLE_EQ(read(head + "\"1.5\" ,1,20\n\"2\",1,21\n")[0].of(Role::time)[1], 0.5);
+}
+
 TEST(Reader, ATrailingSeparatorInTheHeaderMakesNoColumn) {
   EXPECT_EQ(identify::read_table(file("time_s;current_A;housing_degC;\n0;1;20;\n")).names.size(), 3u);
 }
