@@ -194,8 +194,9 @@ void start_singles_again(const Problem& problem, Field& field) {
   }
   in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
   for (Again& again : all) {
-    if (again.fit.x.size() > 0 && again.fit.cost < again.alone->fit.cost)
-      *again.alone = candidate(field.base, std::move(again.fit));
+    if (again.fit.x.size() == 0) continue;
+    Candidate anew = candidate(field.base, std::move(again.fit));
+    if (anew.gain > again.alone->gain) *again.alone = std::move(anew);
   }
   sort(field.singles);
 }

@@ -14,7 +14,7 @@ namespace {
 using thermal::Drive;
 
 constexpr double spare_K = 10;  // below the winding's limit: identification must not burn what it measures
-/// A protocol that is too hot is tried with less, down to a quarter of the current, a twentieth of the heat.
+/// A protocol that is too hot is tried with less, down to a quarter of the current.
 constexpr double weaker = 0.88;
 constexpr int most_tries = 12;
 

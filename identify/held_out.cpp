@@ -14,7 +14,6 @@ constexpr double block_s = 60;  // longer than a housing sensor's slow error (20
 constexpr double veto_share = 0.25;
 constexpr std::size_t least_blocks = 4;  // drawn from fewer, chance looks smaller than it is
 constexpr int least_draws = 100;         // for the 2.5th of a hundred to be one of them
-
 constexpr int veto_draws = 400;
 
 /// Sums of squared residuals of one block under both models.
@@ -90,7 +89,8 @@ void add_interval(const Problem& problem, const Fit& base, const Fit& extended, 
 Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held) {
   Problem out = unseen_by(fitted, held.fraction > 0 ? logs : held.logs);
   for (std::size_t l = 0; held.fraction > 0 && l < out.logs.size(); ++l)
-    forget_readings(out.logs[l], fitted.logs[l].bins.size());
+    forget_readings(out.logs[l],
+                    static_cast<std::size_t>(std::ceil(fitted.logs[l].duration_s() / out.logs[l].width_s - 1e-6)));
   return out;
 }
 
