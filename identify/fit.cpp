@@ -11,6 +11,9 @@ namespace identify {
 namespace {
 
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
+// A housing that is warm when the log begins may hold a winding that is as much warmer again: R1 over R2 of catalogues,
+// 0.03 to 1.4.
+constexpr double warm_excess_share = 0.5;
 
 struct Coordinate {
   double start, prior, sd, low, high;
@@ -46,7 +49,9 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
     const double known = std::isnan(at) ? sink : at;
     out.push_back({known, known, initial_sd_K, known - 60, known + 60});
     const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
-    out.push_back({excess, excess, initial_sd_K + (std::isnan(core) ? 0 : problem.noise.core_white_K), -60, 150});
+    const double excess_sd_K =
+        std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
+    out.push_back({excess, excess, initial_sd_K + excess_sd_K, -60, 150});
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/masks.hpp"
+#include "identify/pauses.hpp"
 #include "identify/units.hpp"
 #include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
@@ -326,12 +327,15 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   }
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
-    Log log = one_log(table, found, rows,
-                      sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
-    check_values(log, motor);
-    mask(log);
-    check_order(log);
-    logs.push_back(std::move(log));
+    Log whole = one_log(table, found, rows,
+                        sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
+    forget_glitches(whole);
+    check_values(whole, motor);
+    for (Log& log : parts_between_pauses(std::move(whole))) {
+      mask(log);
+      check_order(log);
+      logs.push_back(std::move(log));
+    }
   }
   if (in_a_session < table.rows())
     logs.front().notes.push_back(fmt::format("{} rows without a session were left out.", table.rows() - in_a_session));

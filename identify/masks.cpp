@@ -251,6 +251,83 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
   return frozen;
 }
 
+void forget_glitches(Log& log) {
+  constexpr double jump_K = 10;  // and back; beyond any thermistor's noise
+  constexpr std::size_t most = 3;
+  // Nothing that warms by so much is back within these times: a winding cools in 1 s and more, a housing in minutes.
+  constexpr double winding_s = 2.5, elsewhere_s = 60;
+  constexpr double back_share = 0.1;  // so near to where it came from
+  const auto& t = log.of(Role::time);
+  const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
+  for (const Role role :
+       {Role::coolant, Role::ambient, Role::core, Role::housing, Role::frame, Role::neighbour, Role::board}) {
+    std::vector<double>& v = log.of(role);
+    std::vector<std::size_t> read;
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (!std::isnan(v[i])) read.push_back(i);
+    }
+    const bool motor = role == Role::core || role == Role::housing;
+    const double within_s = role == Role::core ? winding_s : elsewhere_s;
+    /// Readings k to m-1, away from number `from`, with number `to` as near to it as before?
+    const auto glitch = [&](std::size_t k, std::size_t m, std::size_t from, std::size_t to) {
+      const std::size_t first = std::min({read[k], read[from], read[to]}), last = std::max(read[m - 1], read[to]);
+      double away_K = 1e300;
+      bool colder = motor && !sink.empty();  // than all around, which no load makes a motor
+      for (std::size_t i = k; i < m; ++i) {
+        const double change_K = v[read[i]] - v[read[from]];
+        away_K = std::min(away_K, std::abs(change_K));
+        colder = colder && change_K < 0 && v[read[i]] < sink[read[i]] - jump_K;
+      }
+      if (away_K < jump_K) return false;
+      if (colder && v[read[to]] > v[read[k]] + jump_K) return true;
+      // On its way up already: a peak.
+      if (from > 0 && from < k && std::abs(v[read[from]] - v[read[from - 1]]) > back_share * away_K) return false;
+      return t[last] - t[first] <= within_s && std::abs(v[read[to]] - v[read[from]]) < back_share * away_K;
+    };
+    std::vector<std::size_t> glitches;
+    for (std::size_t k = 0; k < read.size(); ++k) {
+      for (std::size_t m = k + 1; m <= std::min(k + most, read.size()); ++m) {
+        const std::size_t left = read.size() - m;
+        const bool is_glitch = k > 0 && left > 0 ? glitch(k, m, k - 1, m)
+                               : left > 1        ? glitch(k, m, m, m + 1)
+                                                 : k > 1 && glitch(k, m, k - 1, k - 2);
+        if (!is_glitch) continue;
+        for (std::size_t i = k; i < m; ++i) glitches.push_back(read[i]);
+        read.erase(read.begin() + static_cast<std::ptrdiff_t>(k), read.begin() + static_cast<std::ptrdiff_t>(m));
+        --k;
+        break;
+      }
+    }
+    for (const std::size_t i : glitches) v[i] = missing;
+    if (!glitches.empty())
+      log.notes.push_back(
+          fmt::format("{} jumps away and back as no temperature can: {} reading{} masked, the first at "
+                      "{:.1f} s.",
+                      own_name(role), glitches.size(), glitches.size() == 1 ? "" : "s", t[glitches.front()]));
+  }
+
+  constexpr double many_times = 3;
+  for (const Role role : {Role::current, Role::id, Role::iq, Role::power}) {
+    std::vector<double>& v = log.of(role);
+    double lasting = 0;  // the most that two rows in a row hold
+    for (std::size_t i = 1; i < v.size(); ++i) {
+      const double both = std::min(std::abs(v[i]), std::abs(v[i - 1]));
+      if (!std::isnan(both)) lasting = std::max(lasting, both);
+    }
+    std::size_t glitches = 0, first = 0;
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (!(lasting > 0) || !(std::abs(v[i]) > many_times * lasting)) continue;
+      if (glitches++ == 0) first = i;
+      v[i] = missing;
+    }
+    if (glitches > 0)
+      log.notes.push_back(
+          fmt::format("{} exceeds {:g} times what it ever holds for two rows, in {} single row{}; masked, the first at "
+                      "{:.1f} s.",
+                      own_name(role), many_times, glitches, glitches == 1 ? "" : "s", t[first]));
+  }
+}
+
 void mask(Log& log) {
   for (const Role role :
        {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {

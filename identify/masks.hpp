@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Finds what a log claims but cannot have measured: frozen channels, readings between the steps of a coarse sensor,
-// holes, gaps in time. Masks it and says so.
+// Finds what a log claims but cannot have measured: glitches, frozen channels, readings between the steps of a coarse
+// sensor, holes, gaps in time. Masks it and says so.
 #pragma once
 
 #include "identify/log.hpp"
 
 namespace identify {
+
+/// Turns readings, up to three in a row, that jump away and back as no temperature can, and single rows of a current
+/// that is several times what ever lasts, into missing ones.
+void forget_glitches(Log& log);
 
 /// Turns frozen readings into missing ones, sums up what is missing and lies in gaps, leaves of a coarse sensor the
 /// moments of its steps, and notes each in log.notes.

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <random>
 
 #include "identify/log.hpp"
@@ -349,11 +351,102 @@ TEST(Masks, RowsMissingOneByOneAreCounted) {
 }
 TEST(Masks, GapsInTimeAreCounted) {
   std::string text = head;
-  for (int i = 0; i < 100; ++i) text += std::to_string(i < 50 ? i : i + 40) + ",1," + std::to_string(20 + i % 7) + "\n";
+  for (int i = 0; i < 100; ++i)
+    text += std::to_string(0.1 * (i < 50 ? i : i + 40)) + ",1," + std::to_string(20 + i % 7) + "\n";
   const Log log = read(text)[0];
   EXPECT_NEAR(log.gap_share, 40.0 / 139, 0.01);
   ASSERT_FALSE(log.notes.empty());
   says(log.notes.back(), "1 gap in time");
+}
+
+/// A row a second of a measured current and a housing that warms.
+std::string recording(int rows, const std::function<bool(int, double&, double&)>& kept) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.01);
+  std::string text = head;
+  for (int i = 0; i < rows; ++i) {
+    double current_A = 2 + noise(random), housing_degC = 20 + 0.05 * i + noise(random);
+    if (!kept(i, current_A, housing_degC)) continue;
+    text += std::to_string(i) + "," + (std::isnan(current_A) ? "" : std::to_string(current_A)) + "," +
+            std::to_string(housing_degC) + "\n";
+  }
+  return text;
+}
+
+TEST(Masks, ReadingsThatJumpAwayAndBackAreGlitches) {
+  for (const double reads : {85.0, -127.0, 0.0}) {
+    const Log log = read(recording(200, [&](int i, double&, double& housing_degC) {
+      if (i == 0 || i == 40 || (i >= 90 && i < 93) || i == 199) housing_degC = reads;
+      return true;
+    }))[0];
+    const auto& housing = log.of(Role::housing);
+    for (const double x : housing) EXPECT_TRUE(std::isnan(x) || (x > 19 && x < 31)) << x;
+    EXPECT_EQ(std::count_if(housing.begin(), housing.end(), [](double x) { return std::isnan(x); }), 6);
+    says(log.notes.front(), "6 readings masked, the first at 0.0 s");
+  }
+}
+TEST(Masks, AWindingThatIsHotForSecondsIsNoGlitchAndOneColderThanItsRoomIs) {
+  std::string text = "time_s,current_A,core_degC,ambient_degC\n";
+  for (int i = 0; i < 60; ++i)
+    text +=
+        std::to_string(i) + ",1," + std::to_string(i == 40 ? 0 : 20 + 60 * std::exp(-std::abs(i - 20) / 3.0)) + ",20\n";
+  const auto& core = read(text)[0].of(Role::core);
+  EXPECT_DOUBLE_EQ(core[20], 80);
+  EXPECT_TRUE(std::isnan(core[40]));
+}
+TEST(Masks, OneRowOfManyTimesTheCurrentIsAGlitchAndTwoRowsAreNone) {
+  const auto current = [](int rows) {
+    const std::string text = recording(200, [&](int i, double& current_A, double&) {
+      if (i >= 50 && i < 50 + rows) current_A = 99;
+      return true;
+    });
+    return read(text)[0].of(Role::current)[50];
+  };
+  EXPECT_TRUE(std::isnan(current(1)));
+  EXPECT_EQ(current(2), 99);
+}
+
+TEST(Pauses, WhatFollowsOneIsALogOfItsOwn) {
+  const auto logs = read(recording(400, [](int i, double&, double&) { return i < 100 || i >= 300; }));
+  ASSERT_EQ(logs.size(), 2u);
+  EXPECT_EQ(logs[0].of(Role::time).back(), 99);
+  EXPECT_EQ(logs[1].of(Role::time).front(), 0);
+  EXPECT_EQ(logs[1].of(Role::time).back(), 99);
+  says(logs[1].name, "(from 300 s)");
+  says(logs[0].notes.back(), "Nothing tells the heat input for 201 s from 99 s");
+  // Both in the same room, though one began warm and no room was recorded.
+  EXPECT_EQ(logs[1].of(Role::ambient), logs[0].of(Role::ambient));
+}
+TEST(Pauses, ACurrentThatIsNotWrittenForAWhileIsOneAlsoAtTheEnd) {
+  const auto logs = read(recording(400, [](int i, double& current_A, double&) {
+    if ((i >= 100 && i < 200) || i >= 340) current_A = std::nan("");
+    return true;
+  }));
+  ASSERT_EQ(logs.size(), 2u);
+  EXPECT_EQ(logs[0].of(Role::time).size(), 100u);
+  EXPECT_EQ(logs[1].of(Role::time).size(), 140u);
+}
+TEST(Pauses, AMeasuredCurrentThatStandsStillIsOneAndACommandedOneIsNone) {
+  const auto stands = [](double noise_A) {
+    return read(recording(400,
+                          [&](int i, double& current_A, double&) {
+                            const double ramp_A = 0.01 * std::min(i, 150);
+                            current_A = i >= 200 && i < 300 ? 1.4321 : ramp_A + noise_A * (current_A - 2);
+                            return true;
+                          }))
+        .size();
+  };
+  EXPECT_EQ(stands(1), 2u);
+  EXPECT_EQ(stands(0), 1u);
+}
+TEST(Pauses, OfManyTheLongestCount) {
+  const auto logs = read(recording(2000, [](int i, double&, double&) { return i % 100 >= (i < 1000 ? 10 : 20); }));
+  EXPECT_EQ(logs.size(), 8u);
+}
+TEST(Pauses, WhatIsTooShortBetweenThemIsLeftOutAndSaid) {
+  const auto logs = read(recording(400, [](int i, double&, double&) { return i < 150 || i / 10 == 20 || i >= 300; }));
+  ASSERT_EQ(logs.size(), 2u);
+  says(logs[0].notes.back(), "9 s in parts too short for that are left out");
 }
 
 }  // namespace
