@@ -114,6 +114,10 @@ Values parameters_of_model(const std::string& path, std::string& why) {
 Offer offer(const nlohmann::json& answer, const std::string& model_path, double housing_noise_K) {
   Offer offer;
   std::string why;
+  if (answer.is_object() && answer.value("verdict", std::string()) == "insufficient") {
+    offer.note = "this log cannot tell; the board's parameters stay as they are";
+    return offer;
+  }
   offer.values = parameters_of_model(model_path, why);
   if (offer.values.empty()) {
     const auto miss = !answer.is_object() ? nlohmann::json()

@@ -28,15 +28,16 @@ std::string identify_program() {
 }
 
 /// Runs it without a shell, for a program that reads JSON from us with its text on standard error. Throws UserError
-/// (unusable) when it could not answer; it has said why.
-void run_identify(std::vector<std::string> arguments, bool json) {
+/// (unusable) when it left no answer in the file `json`; it has said why.
+void run_identify(std::vector<std::string> arguments, const std::string& json, bool quiet) {
+  std::filesystem::remove(json);  // of an earlier run
   arguments.insert(arguments.begin(), identify_program());
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   const pid_t child = fork();
   if (child == 0) {
-    if (json) dup2(STDERR_FILENO, STDOUT_FILENO);
+    if (quiet) dup2(STDERR_FILENO, STDOUT_FILENO);
     execvp(argv[0], argv.data());
     _exit(127);
   }
@@ -46,7 +47,7 @@ void run_identify(std::vector<std::string> arguments, bool json) {
   const int code = child > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 127;
   if (code == 127)
     throw UserError(Exit::unusable, "The program identify was not found; build it or put it beside hotcore.");
-  if (code != 0)
+  if (code != 0 && !std::filesystem::exists(json))
     throw UserError(Exit::unusable, "identify could not use the log; its sentence stands above, the log is kept.");
 }
 
@@ -122,7 +123,7 @@ void identify(Console& console, const Arguments& a) {
                   axis, a.minutes, 2.5 * rated_A));
   const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
-  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"},
+  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"}, json,
                console.options.json);
 
   std::ifstream in(json);

@@ -43,12 +43,13 @@ std::vector<Rung> ladder_of(const Search& found) {
   return out;
 }
 
-/// What stands in a cause's place in the other sets of the tie, and how far behind.
+/// What stands in a cause's place in the next best sets, and how far behind: all that tie, else the nearest three.
 std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
+  constexpr std::size_t most = 3;
   std::vector<Rival> out;
   for (const Candidate& c : found.sets) {
     const auto theirs = ids_of(c.fit.chosen);
-    if (!c.tied || holds(theirs, id)) continue;
+    if (holds(theirs, id) || (!c.tied && out.size() >= most)) continue;
     for (const std::string& other : theirs) {
       const bool known = std::any_of(out.begin(), out.end(), [&](const Rival& r) { return r.id == other; });
       if (!known && !holds(found.tied.front(), other)) out.push_back({other, found.chosen.gain - c.gain});
@@ -76,7 +77,7 @@ void tell(const Problem& problem, const Search& found, Report& report) {
     line.signature = cause.signature;
     line.easily_taken_for = cause.rivals;
     line.experiment = cause.experiment;
-    line.evidence = found.chosen.gain;
+    line.evidence = found.own_gain[i];
     line.parameters = cause_lines(problem, f, i);
     line.rivals = rivals_of(cause.id, found);
     report.causes.push_back(std::move(line));
@@ -301,6 +302,8 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (extended) {
     add_extended(problem, found.chosen.fit, report, 0);
     report.extended = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()));
+    // A heat that no longer depends on the winding, say, leaves R1 open.
+    if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, found.chosen.fit);
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
     if (report.gain) report.gain->like = listed(ids_of(offer.fit->chosen), " and ");
   }
@@ -311,7 +314,13 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (unseen) {
     report.held_out = score_held_out(*unseen, held, two, nearest ? *nearest : found.chosen.fit, report);
     if (nearest) report.held_out->nearest = ids_of(nearest->chosen);
+    if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }
+  if (!poor.empty())
+    report.no_model = "this log cannot tell; run the board with the motor's sheet";
+  else if (problem.heated_by_power())
+    report.no_model = "the log tells a power and a board measures a current; record current_A";
+  if (!report.no_model.empty()) return report;
   report.model_toml = heat_set_toml(problem, *offer.fit, report.sentence, offer.trust);
   report.baseline_toml =
       heat_set_toml(problem, two, "The two-resistor model as fitted, without what was found.", trust_of(problem, two));

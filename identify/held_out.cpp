@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "identify/search.hpp"
+
 namespace identify {
 namespace {
 
@@ -74,10 +76,37 @@ Interval middle_95(const std::vector<double>& sorted) {
   return {sorted[static_cast<std::size_t>(0.025 * n)], sorted[static_cast<std::size_t>(0.975 * n)]};
 }
 
-void add_interval(const Problem& problem, const Fit& base, const Fit& extended, int draws, HeldOut& out) {
+/// What was held out may speak against the answer: what was found does worse there, or all that was fitted misses far
+/// more than where it was fitted.
+std::string speaks_against(const std::vector<Block>& blocks, const HeldOut& out, const Report& report) {
+  const auto of = [&](const Rmse& e) { return out.winding ? e.core_K : e.housing_K; };
+  const double before_K = of(out.before), after_K = of(out.after);
+  const char* what = out.winding ? "winding" : "housing";
+  if (!report.causes.empty() && blocks.size() >= least_blocks) {
+    const std::vector<double> growth_K = resampled(blocks, veto_draws).growth_K;
+    if (middle_95(growth_K).low > 0)
+      return fmt::format(
+          "On what was held out, though, it misses the {} by {:.2f} K, where two resistors miss it by "
+          "{:.2f} K: do not rely on it.",
+          what, after_K, before_K);
+  }
+  constexpr double far = 3, worth_K = 1;
+  const double fitted_K = of(report.causes.empty() ? report.baseline_rmse : report.extended_rmse);
+  const bool answered = report.verdict != word(Verdict::unknown_cause) && report.verdict != word(Verdict::insufficient);
+  if (answered && !std::isnan(fitted_K) && after_K > std::max(worth_K, far * fitted_K))
+    return fmt::format(
+        "On what was held out, though, the {} is missed by {:.2f} K, where {:.2f} K were missed in the "
+        "fit: something in it is not in what was fitted.",
+        what, after_K, fitted_K);
+  return "";
+}
+
+void judge(const Problem& problem, const Fit& base, const Fit& extended, int draws, const Report& report,
+           HeldOut& out) {
   out.winding = problem.any_core();
   const auto blocks = blocks_of(problem, base, extended, out.winding);
   out.blocks = static_cast<int>(blocks.size());
+  out.against = speaks_against(blocks, out, report);
   if (blocks.size() < least_blocks || draws < least_draws) return;
   const Resampled r = resampled(blocks, draws);
   out.before_95 = middle_95(r.before_K);
@@ -101,7 +130,9 @@ HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& ba
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
     out.before = rmse_of(unseen, base);
     out.after = rmse_of(unseen, extended);
-    add_interval(unseen, base, extended, held.draws, out);
+    judge(unseen, base, extended, held.draws, report, out);
+    add_plots(unseen, base, " (the last part, not seen by the fit)", report);
+    add_extended(unseen, extended, report, report.plots.size() - unseen.logs.size());
     return out;
   }
   out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
@@ -112,7 +143,7 @@ HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& ba
   out.before = rmse_of(unseen, before, &out.each_before);
   out.after = rmse_of(unseen, after);
   for (const Log& log : held.logs) out.names.push_back(log.name);
-  add_interval(unseen, before, after, held.draws, out);
+  judge(unseen, before, after, held.draws, report, out);
   add_plots(unseen, before, " (not seen by the fit)", report);
   add_extended(unseen, after, report, report.plots.size() - held.logs.size());
   return out;

@@ -160,16 +160,19 @@ int answer(Arguments a) {
   }
   identify::Report report = identify::discover(logs, motor, held);
   if (!map.note.empty()) report.notes.push_back(map.note);
-  report.model_file = a.write_model;
+  const bool writes = report.no_model.empty();
+  if (writes) report.model_file = a.write_model;
   if (!a.html.empty()) wire::pc::write_whole(a.html, as_html(report));
-  if (!a.write_model.empty()) wire::pc::write_whole(a.write_model, report.model_toml);
-  if (!a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
+  if (writes && !a.write_model.empty()) wire::pc::write_whole(a.write_model, report.model_toml);
+  if (writes && !a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
   if (a.json == "-") {
     show(as_json(report));
-    return 0;
+  } else {
+    if (!a.json.empty()) wire::pc::write_whole(a.json, as_json(report));
+    show(as_text(report, a.explain) + (a.html.empty() ? "" : "\nReport with pictures: " + a.html + "\n"));
   }
-  if (!a.json.empty()) wire::pc::write_whole(a.json, as_json(report));
-  show(as_text(report, a.explain) + (a.html.empty() ? "" : "\nReport with pictures: " + a.html + "\n"));
+  const std::string& asked = a.write_model.empty() ? a.write_baseline : a.write_model;
+  if (!writes && !asked.empty()) throw UserError(Exit::unusable, asked + ": not written: " + report.no_model + ".");
   return 0;
 }
 
@@ -211,7 +214,8 @@ int main(int argc, char** argv) {
       identify::roles_and_units() +
       "\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
-      "the logs cannot be used. With 2 and 3 one sentence on standard error says why.");
+      "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
+      "error says why.");
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
     return fmt::format("{}; identify --help lists what there is.\n", error.what());
   });

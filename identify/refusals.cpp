@@ -16,6 +16,36 @@ constexpr const char* in_milliseconds =
     "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
     "time_s=COLUMN:ms.";
 
+constexpr const char* in_minutes =
+    "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say --column "
+    "time_s=COLUMN:min.";
+
+/// Without a sheet a motor a thousand times as slow, or 60 times as fast, fits as well. A winding of 17 minutes in a
+/// housing of 28 hours is none: a traction machine of 50 kW warms through within minutes and settles within hours. Nor
+/// is a housing that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute.
+std::string misread_time(const Problem& problem, const Fit& f) {
+  const Physical p = physical(f.x);
+  const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
+  const double winding_s = p.R1_K_per_W * p.C1_J_per_K, housing_s = p.R2_K_per_W * p.C2_J_per_K,
+               all_s = housing_s + p.R2_K_per_W * p.C1_J_per_K;
+  if (all_s < 20 && lines[1].determined && lines[3].determined) return in_minutes;
+  const bool all_determined =
+      std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; });
+  return all_determined && winding_s > 1e3 && housing_s > 1e5 ? in_milliseconds : "";
+}
+
+/// A sheet that the data contradicts by all the room there is, a factor of 30, is of another motor.
+std::string other_motor(const Problem& problem, const Fit& f) {
+  if (!problem.belief.known) return "";
+  for (const ParameterLine& line : base_lines(problem, f, 1)) {
+    if (line.at_bound)
+      return fmt::format(
+          "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, or leave --motor away.",
+          line.name, line.value, line.unit, problem.belief.motor);
+  }
+  return "";
+}
+
 /// What a fit misses over what noise alone would leave.
 double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
 
@@ -154,14 +184,11 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
 
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
-  // Without a sheet a motor a thousand times as slow fits as well. A winding of 17 minutes in a housing of 28 hours is
-  // none: a traction machine of 50 kW warms through within minutes and settles within hours.
-  const Physical two = physical(found.base.fit.x);
-  const auto lines = base_lines(problem, found.base.fit, std::max(1.0, found.base.fit.ratio()));
-  if (std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
-      two.R1_K_per_W * two.C1_J_per_K > 1e3 && two.R2_K_per_W * two.C2_J_per_K > 1e5)
-    return in_milliseconds;
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
+  for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
+    const std::string unit = misread_time(problem, *f);
+    if (!unit.empty()) return unit;
+  }
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return other_motor(problem, found.chosen.fit);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
   Eigen::Index at = base_count;
@@ -188,7 +215,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         "housing_degC are swapped.",
         p.C1_J_per_K / p.C2_J_per_K);
   }
-  return "";
+  return other_motor(problem, found.chosen.fit);
 }
 
 }  // namespace identify

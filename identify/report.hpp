@@ -32,9 +32,9 @@ struct Rival {
 struct CauseLine {
   std::string id, name, signature;
   std::string easily_taken_for, experiment;  // what the table of causes says of it
-  double evidence = 0;                       // over the baseline, of all that are named together
+  double evidence = 0;                       // over the set without it
   std::vector<ParameterLine> parameters;
-  std::vector<Rival> rivals;  // in its place in the other sets of a tie
+  std::vector<Rival> rivals;  // in its place in the next best sets
 };
 
 struct Variant {
@@ -59,6 +59,7 @@ struct HeldOut {
   bool winding = false;                         // the intervals are of the winding's rms; else of the housing's
   int blocks = 0;                               // of a minute
   std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few
+  std::string against;                          // how it speaks against the answer; empty: it does not
   std::vector<Rmse> each_before;                // per log, when whole logs were held out
   std::vector<std::string> names;
 };
@@ -124,6 +125,7 @@ struct Report {
   std::optional<HeldOut> held_out;
   std::optional<Gain> gain;
   std::optional<Experiment> experiment;
+  std::string no_model;       // why no board gets a set of this; empty: the two below are there
   std::string model_toml;     // the parameter set (--write-model)
   std::string baseline_toml;  // the two-resistor model as fitted, as a set (--write-baseline)
   std::string model_file;

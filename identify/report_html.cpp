@@ -148,9 +148,13 @@ std::string candidates(const Report& r) {
 std::string named(const Report& r) {
   std::string s;
   for (const CauseLine& c : r.causes) {
-    s += fmt::format("<h2>{}: {}</h2><p>{}. Evidence{}: {:.1f}.</p><p>Shows as: {}.</p><table>",
-                     cause_heading(r.verdict), escaped(c.id), escaped(c.name),
-                     r.causes.size() > 1 ? " of all named" : "", c.evidence, escaped(c.signature)) +
+    std::string rivals;
+    for (const Rival& rival : c.rivals)
+      rivals += fmt::format("{} {} ({:.1f} behind)", rivals.empty() ? "Next best in its place:" : ",", rival.id,
+                            rival.behind);
+    s += fmt::format(
+             "<h2>{}: {}</h2><p>{}. Evidence over the model without it: {:.1f}. {}</p><p>Shows as: {}.</p><table>",
+             cause_heading(r.verdict), escaped(c.id), escaped(c.name), c.evidence, rivals, escaped(c.signature)) +
          parameter_rows(c.parameters) +
          fmt::format("</table><p>Easily taken for: {}; told from them by: {}.</p>\n", escaped(c.easily_taken_for),
                      escaped(c.experiment));

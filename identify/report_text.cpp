@@ -86,8 +86,8 @@ std::string candidates(const Report& r) {
 std::string named(const Report& r) {
   std::string s;
   for (const CauseLine& c : r.causes) {
-    s += fmt::format("\n{}: {}\n  {}\n  evidence{}: {:.1f}\n  shows as: {}\n", cause_heading(r.verdict), c.id, c.name,
-                     r.causes.size() > 1 ? " of all named" : "", c.evidence, c.signature);
+    s += fmt::format("\n{}: {}\n  {}\n  evidence over the model without it: {:.1f}\n  shows as: {}\n",
+                     cause_heading(r.verdict), c.id, c.name, c.evidence, c.signature);
     for (const ParameterLine& p : c.parameters) s += line_of(p);
     for (const Rival& rival : c.rivals) s += fmt::format("  rival: {} ({:.1f} behind)\n", rival.id, rival.behind);
     s += fmt::format("  easily taken for: {}; told from them by: {}\n", c.easily_taken_for, c.experiment);

@@ -158,6 +158,7 @@ Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>
 /// One cause or two?
 void choose(const Problem& judged, const Margins& margins, Field field, Search& out) {
   const std::string refusal = why_no_pair(judged, field, margins);
+  const std::vector<Candidate> singles = field.singles;
   if (refusal.empty()) {
     const Candidate &pair = field.pairs.front(), &single = field.singles.front();
     out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.gain,
@@ -170,6 +171,15 @@ void choose(const Problem& judged, const Margins& margins, Field field, Search& 
   }
   out.sets.front().chosen = true;
   out.chosen = out.sets.front();
+  for (const Chosen& cause : out.chosen.fit.chosen) {
+    double without = 0;
+    for (const Candidate& single : singles) {
+      const Chosen& other = single.fit.chosen.front();
+      const auto& set = out.chosen.fit.chosen;
+      if (!(other == cause) && std::find(set.begin(), set.end(), other) != set.end()) without = single.gain;
+    }
+    out.own_gain.push_back(out.chosen.gain - without);
+  }
 }
 
 /// What the set that was chosen leaves.

@@ -65,6 +65,7 @@ struct Search {
   std::vector<Candidate> sets;                 // sets of the size that was chosen, best first
   Candidate chosen;                            // what is believed best, whatever the verdict
   std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good as the best, itself first
+  std::vector<double> own_gain;                // of each cause chosen: over the set without it
   double remains_K = 0;                        // of a slow disturbance that the sets named or tied leave
   Noise noise;                                 // of the readings, as the best model's residuals show it
   Verdict verdict = Verdict::insufficient;

@@ -124,6 +124,14 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
   EXPECT_EQ(offered.values, expected);
 }
 
+TEST(HeatExperiment, OfALogThatCannotTellNothingIsOffered) {
+  nlohmann::json insufficient = answer(0.1, true);
+  insufficient["verdict"] = "insufficient";
+  const auto offered = console::offer(insufficient, file("model.toml", two_resistors), 0.5);
+  EXPECT_TRUE(offered.values.empty());
+  EXPECT_NE(offered.note.find("cannot tell"), std::string::npos) << offered.note;
+}
+
 TEST(HeatExperiment, BeyondTheBoardsModelOnlyASmallMissIsForgiven) {
   const std::string model =
       file("model.toml", two_resistors + "[[source]]\nnode = 1\ndrive = \"speed_rad_per_s\"\ngain = 0.1\n");

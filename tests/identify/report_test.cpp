@@ -122,6 +122,61 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   EXPECT_GT(scored.before.core_K, 2);
 }
 
+TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
+  tests::BenchOptions fitted, held_out;
+  for (auto* o : {&fitted, &held_out}) o->core_every_s = 20;
+  held_out.seed = 2;
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  const auto sentence = [&] {
+    identify::HoldOut held;
+    held.logs = bench_logs({held_out});
+    const identify::Report report = identify::discover(bench_logs({fitted}), motor, held);
+    EXPECT_NE(report.verdict, "unknown_cause");
+    return report.sentence;
+  };
+  EXPECT_EQ(sentence().find("held out"), std::string::npos);
+  held_out.motor.R2 *= 2;  // in still air, say
+  EXPECT_NE(sentence().find("something in it is not in what was fitted"), std::string::npos) << sentence();
+  held_out.motor.R2 /= 2;
+  fitted.extra_housing_W = [](double t, double, double) { return 0.003 * t; };  // a room that warms, but there
+  EXPECT_NE(sentence().find("do not rely on it"), std::string::npos) << sentence();
+}
+
+TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousing) {
+  tests::BenchOptions options;
+  options.seconds = 2400;
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  EXPECT_EQ(identify::discover(bench_logs({options}), motor).core_refusal, "");
+  options.motor.copper = 0;
+  const identify::Report report = identify::discover(bench_logs({options}), motor);
+  ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+  EXPECT_EQ(report.causes[0].id, "copper_coefficient");
+  EXPECT_NE(report.core_refusal, "");
+  EXPECT_FALSE(report.gain);
+}
+
+TEST(Report, EachOfTwoCausesHasEvidenceOfItsOwnAndTheNextBestInItsPlace) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seconds = 1800;
+  options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
+  const json one = json::parse(identify::as_json(report_of(options)));
+  ASSERT_EQ(one["causes"].size(), 1u) << one["sentence"];
+  ASSERT_EQ(one["verdict"], "explained");
+  EXPECT_GE(one["causes"][0]["rivals"].size(), 1u);
+  EXPECT_LE(one["causes"][0]["rivals"].size(), 3u);
+  options.extra_housing_W = [](double t, double current, double) {
+    return 0.6 * current * current + (t > 900 ? 2 : 0);
+  };
+  const json two = json::parse(identify::as_json(report_of(options)));
+  ASSERT_EQ(two["causes"].size(), 2u) << two["sentence"];
+  const double alone = one["causes"][0]["delta_bic"], first = two["causes"][0]["delta_bic"],
+               second = two["causes"][1]["delta_bic"];
+  EXPECT_NE(first, second);
+  EXPECT_GT(std::min(first, second), 10) << "what a second cause must gain";
+  EXPECT_GT(alone, 10);
+}
+
 TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions one, other;
@@ -194,8 +249,7 @@ TEST(Report, WhatIsAdequateHasNothingToGain) {
 }
 
 /// A good log whose rows `edit` spoils: (time, current, speed, housing, ambient, winding or empty).
-std::string spoilt(const std::function<bool(std::vector<std::string>&, int)>& edit) {
-  tests::BenchOptions options;
+std::string spoilt(const std::function<bool(std::vector<std::string>&, int)>& edit, tests::BenchOptions options = {}) {
   options.core_every_s = 20;
   options.seconds = 900;
   const std::string path = tests::write_bench_log("hotcore_spoilt.csv", options);
@@ -244,6 +298,40 @@ TEST(BadInput, TimeInMilliseconds) {
   refused(spoilt(in_ms), "check the units of current and time");
   const Outcome without_sheet = run(spoilt(in_ms));
   EXPECT_NE(without_sheet.out.find("--column time_s=COLUMN:ms"), std::string::npos) << without_sheet.out;
+}
+
+TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
+  const Outcome r =
+      run(spoilt([](auto& row, int number) { return row[0] = std::to_string(number * 100), true; }, options));
+  EXPECT_NE(r.out.find("Verdict: insufficient"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("--column time_s=COLUMN:ms"), std::string::npos) << r.out;
+}
+
+TEST(BadInput, TimeInMinutes) {
+  const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
+  const Outcome r = run(spoilt(in_min));
+  EXPECT_NE(r.out.find("Verdict: insufficient"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("--column time_s=COLUMN:min"), std::string::npos) << r.out;
+}
+
+TEST(BadInput, TheSheetOfAnotherMotor) {
+  const auto as_it_is = [](auto&, int) { return true; };
+  const Outcome near = run(spoilt(as_it_is) + " --motor ec-powermax-30-48v");
+  EXPECT_NE(near.out.find("times the sheet's; see whether maxon EC-powermax 30"), std::string::npos) << near.out;
+  tests::BenchOptions insulated;
+  insulated.motor.R1 = 45;
+  insulated.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 200) < 100 ? 1.2 : 0.3; };
+  refused(spoilt(as_it_is, insulated), "30 times off the sheet");
+}
+
+TEST(BadInput, APauseInWhichTheMotorRanOn) {
+  const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
+  const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");
+  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("Nothing tells the heat input for 60 s from 400 s"), std::string::npos) << r.out;
 }
 
 TEST(BadInput, FortyPercentMissing) {
@@ -403,6 +491,27 @@ TEST(Program, BadDataEndsWithThreeAndWritesNothing) {
   EXPECT_EQ(r.code, 3);
   EXPECT_EQ(std::count(r.out.begin(), r.out.end(), '\n'), 1) << r.out;
   EXPECT_FALSE(std::filesystem::exists(json_path));
+}
+
+TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
+  const std::string model = (std::filesystem::temp_directory_path() / "hotcore_no_model.toml").string();
+  const auto asked = [&](const tests::BenchOptions& options) {
+    std::filesystem::remove(model);
+    const Outcome r =
+        run(tests::write_bench_log("hotcore_no_model.csv", options) + " --motor ec-16-40w --write-model " + model);
+    EXPECT_EQ(std::filesystem::exists(model), r.code == 0) << r.out;
+    EXPECT_NE(r.out.find("Verdict:"), std::string::npos) << r.out;
+    return r;
+  };
+  tests::BenchOptions options;
+  EXPECT_EQ(asked(options).code, 0);
+  options.seconds = 120;
+  EXPECT_EQ(asked(options).code, 3);
+  options.seconds = 900;
+  options.power_gain = 1;
+  const Outcome r = asked(options);
+  EXPECT_EQ(r.code, 3);
+  EXPECT_NE(r.out.find("not written: the log tells a power"), std::string::npos) << r.out;
 }
 
 TEST(Program, AWrongOptionIsUsage) {
