@@ -268,6 +268,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     found = search(problem);
     poor = too_short(problem, base, found);
     if (poor.empty()) poor = suspicion(problem, found, logs, motor);
+    if (poor.empty()) poor = too_sparse(problem, found, logs);
     const bool to_judge = poor.empty() && unseen && !found.chosen.fit.chosen.empty();
     const std::string refused = to_judge ? veto(problem, found.base.fit, found.chosen.fit) : "";
     vetoed = !refused.empty();

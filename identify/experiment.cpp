@@ -187,6 +187,7 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
                        : best_D < 20 ? "a fair chance"
                        : best_D < 40 ? "a chance of about 90 %"
                                      : "near certainty";
+  if (best_D < 3) best.why = "No course known here is likely to tell. The best of them: " + best.why;
   best.why = fmt::format(
       "{}: the tied models then differ by {:.0f} squared noise units or more, with {} of telling them apart; the "
       "winding stays below {:.0f} degC",

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/baseline.hpp"
+#include "identify/disturbance.hpp"
 #include "identify/units.hpp"
 
 namespace identify {
@@ -16,28 +17,27 @@ constexpr const char* in_milliseconds =
     "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
     "time_s=COLUMN:ms.";
 
-constexpr const char* in_minutes =
-    "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say --column "
-    "time_s=COLUMN:min.";
-
-/// Without a sheet a motor a thousand times as slow, or 60 times as fast, fits as well. A winding of 17 minutes in a
-/// housing of 28 hours is none: a traction machine of 50 kW warms through within minutes and settles within hours. Nor
-/// is a housing that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute.
-std::string misread_time(const Problem& problem, const Fit& f) {
+/// A motor a thousand times as slow fits as well where no sheet says otherwise. A winding of 17 minutes in a housing of
+/// 28 hours is none: a traction machine of 50 kW warms through within minutes and settles within hours.
+bool far_too_slow(const Problem& problem, const Fit& f) {
   const Physical p = physical(f.x);
   const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
-  const double winding_s = p.R1_K_per_W * p.C1_J_per_K, housing_s = p.R2_K_per_W * p.C2_J_per_K,
-               all_s = housing_s + p.R2_K_per_W * p.C1_J_per_K;
-  if (all_s < 20 && lines[1].determined && lines[3].determined) return in_minutes;
-  const bool all_determined =
-      std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; });
-  return all_determined && winding_s > 1e3 && housing_s > 1e5 ? in_milliseconds : "";
+  return std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
+         p.R1_K_per_W * p.C1_J_per_K > 1e3 && p.R2_K_per_W * p.C2_J_per_K > 1e5;
 }
 
-/// A sheet that the data contradicts by all the room there is, a factor of 30, is of another motor.
-std::string other_motor(const Problem& problem, const Fit& f) {
+/// Nor is a housing that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a sheet that
+/// the data contradicts by all the room there is, a factor of 30, is of another motor.
+std::string unlike_the_motor(const Problem& problem, const Search& found) {
+  for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
+    const Physical p = physical(f->x);
+    const auto lines = base_lines(problem, *f, std::max(1.0, f->ratio()));
+    if (p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && lines[1].determined && lines[3].determined)
+      return "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
+             "--column time_s=COLUMN:min.";
+  }
   if (!problem.belief.known) return "";
-  for (const ParameterLine& line : base_lines(problem, f, 1)) {
+  for (const ParameterLine& line : base_lines(problem, found.chosen.fit, 1)) {
     if (line.at_bound)
       return fmt::format(
           "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, or leave --motor away.",
@@ -182,13 +182,56 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
   return "";
 }
 
+std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+  if (found.verdict != Verdict::unknown_cause) return "";
+  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
+  std::vector<Log> before = logs, after = logs;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
+      if (!logs[l].has(role)) continue;
+      std::vector<double>&last = before[l].of(role), &next = after[l].of(role);
+      for (std::size_t i = 1; i < last.size(); ++i) {
+        if (std::isnan(last[i])) last[i] = last[i - 1];
+      }
+      for (std::size_t i = next.size() - 1; i-- > 0;) {
+        if (std::isnan(next[i])) next[i] = next[i + 1];
+      }
+      next.erase(next.begin());
+      next.push_back(next.back());
+    }
+  }
+  const Problem held = unseen_by(problem, before), taken = unseen_by(problem, after);
+  double sum = 0, bins = 0, apart_s = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const Replayed a = replayed(held, found.base.fit, static_cast<int>(l)),
+                   b = replayed(taken, found.base.fit, static_cast<int>(l));
+    const bool housing = problem.logs[l].has_housing;
+    for (std::size_t k = 0; k < a.housing_degC.size(); ++k) {
+      const double moved_K = housing ? a.housing_degC[k] - b.housing_degC[k] : a.core_degC[k] - b.core_degC[k];
+      sum += moved_K * moved_K / 12;
+      ++bins;
+    }
+    apart_s = std::max(apart_s, problem.logs[l].interval_s);
+  }
+  const double doubt_K = std::sqrt(sum / bins);
+  const double left_K =
+      disturbance_of(problem, fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})).noise.disturbance_K;
+  // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
+  // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
+  constexpr double times = 3;
+  if (left_K > times * doubt_K) return "";
+  return fmt::format(
+      "What is left, {:.2f} K, is no more than what the moments leave open at which the load changed "
+      "between rows {:g} s apart or in cells left empty: record the current in every row and more often.",
+      left_K, apart_s);
+}
+
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
-    const std::string unit = misread_time(problem, *f);
-    if (!unit.empty()) return unit;
+    if (far_too_slow(problem, *f)) return in_milliseconds;
   }
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return other_motor(problem, found.chosen.fit);
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
   Eigen::Index at = base_count;
@@ -215,7 +258,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         "housing_degC are swapped.",
         p.C1_J_per_K / p.C2_J_per_K);
   }
-  return other_motor(problem, found.chosen.fit);
+  return unlike_the_motor(problem, found);
 }
 
 }  // namespace identify

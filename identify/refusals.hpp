@@ -20,4 +20,8 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor);
 
+/// Where nothing explains a log: may what is left be of rows too far apart, or of a load that cells do not tell? Empty
+/// when not.
+std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs);
+
 }  // namespace identify

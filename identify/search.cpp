@@ -372,7 +372,10 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
     out.steps.push_back(
         tie ? fmt::format("{} other set{} within {:.0f} of it cannot be told from it with this data; {}.",
                           out.tied.size() - 1, out.tied.size() > 2 ? "s" : "", reach, left.words())
-            : fmt::format("No other set comes within {:.0f} of it; {}.", reach, left.words()));
+            : fmt::format("No other set comes {}; {}.",
+                          left.complete ? fmt::format("within {:.0f} of it", reach)
+                                        : std::string("near it, what is left over counted for each"),
+                          left.words()));
     if (!left.complete && !left.mostly)
       out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }

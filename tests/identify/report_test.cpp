@@ -334,6 +334,18 @@ TEST(BadInput, APauseInWhichTheMotorRanOn) {
   EXPECT_NE(r.out.find("Nothing tells the heat input for 60 s from 400 s"), std::string::npos) << r.out;
 }
 
+TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.core_every_s = 2;
+  options.seconds = 3600;
+  const auto rows = [&](int apart) {
+    return run(spoilt([&](auto&, int row) { return row % apart == 0; }, options) + " --motor ec-16-40w").out;
+  };
+  EXPECT_NE(rows(1).find("Verdict: adequate"), std::string::npos) << rows(1);
+  EXPECT_NE(rows(20).find("between rows 2 s apart"), std::string::npos) << rows(20);
+}
+
 TEST(BadInput, FortyPercentMissing) {
   std::mt19937 random(4);
   refused(spoilt([&](auto&, int) { return random() % 10 >= 4; }), "40 % of the readings or rows are missing");
