@@ -138,6 +138,19 @@ std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
   return out.empty() ? out : "Not tried, since a column does not tell: " + out + ".";
 }
 
+/// A room whose temperature was typed in, and warms, looks like a mass, a drift or another cooling.
+void note_typed_ambient(const std::vector<Log>& logs, Report& report) {
+  for (const Log& log : logs) {
+    const auto& room = log.of(Role::ambient);
+    const bool stands = std::all_of(room.begin(), room.end(), [&](double x) { return x == room.front(); });
+    if (log.has(Role::ambient) && !log.has(Role::coolant) && stands)
+      report.notes.push_back(fmt::format(
+          "{}: ambient_degC never moves; a room that warms unmeasured looks like a third mass, a drift or a change of "
+          "cooling.",
+          log.name));
+  }
+}
+
 /// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
 /// times the rating, an ordinary overload for seconds.
 double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& motor) {
@@ -295,6 +308,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
+    if (found.verdict != Verdict::adequate) note_typed_ambient(logs, report);
     const std::string untried = not_tried(problem, logs);
     if (!untried.empty())
       (found.verdict == Verdict::unknown_cause ? report.notes : report.reasoning).push_back(untried);
