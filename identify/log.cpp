@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/masks.hpp"
+#include "identify/median.hpp"
 #include "identify/pauses.hpp"
 #include "identify/units.hpp"
 #include "wire/pc/names.hpp"
@@ -221,6 +222,59 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
   }
 }
 
+/// How many rows come before the first heat. One part in a thousand of the most is a sensor's offset.
+std::size_t rows_at_rest(const Log& log) {
+  const auto heat = [&](std::size_t i) {
+    if (log.has(Role::power)) return std::abs(log.of(Role::power)[i]);
+    double A2 = 0;
+    for (const Role role : {Role::current, Role::id, Role::iq}) {
+      if (log.has(role)) A2 += log.of(role)[i] * log.of(role)[i];
+    }
+    return A2;
+  };
+  const std::size_t rows = log.of(Role::time).size();
+  double most = 0;
+  for (std::size_t i = 0; i < rows; ++i) most = heat(i) > most ? heat(i) : most;
+  std::size_t rest = 0;
+  while (rest < rows && !(heat(rest) > 1e-3 * most)) ++rest;
+  return rest;
+}
+
+/// The winding's resistance tells its temperature once both are known of one moment: at the start, where a motor that
+/// rested is as warm as the room everywhere. The first readings, five at most, since it may be read now and then only.
+void read_resistance(Log& log) {
+  constexpr double per_K = 0.00393, at_degC = 20;  // copper
+  constexpr double soaked_K = 1;                   // two sensors beside each other differ by as much
+  if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
+  const std::size_t rest = rows_at_rest(log);
+  const auto at_start = [&](Role role) {
+    std::vector<double> first;
+    for (std::size_t i = 0; log.has(role) && i < rest && first.size() < 5; ++i) {
+      if (!std::isnan(log.of(role)[i])) first.push_back(log.of(role)[i]);
+    }
+    return median(first);
+  };
+  const double start_ohm = at_start(Role::winding_ohm), start_degC = at_start(Role::housing);
+  bool soaked = start_ohm > 0 && !std::isnan(start_degC);
+  for (const Role role : {Role::ambient, Role::coolant})
+    soaked = soaked && (!log.has(role) || std::abs(at_start(role) - start_degC) <= soaked_K);
+  if (!soaked) {
+    log.notes.push_back(
+        "winding_ohm is not used, since its temperature is known at no moment: begin the log at rest with a reading of "
+        "it and all at room temperature, or convert it to core_degC yourself.");
+    return;
+  }
+  check_range(log, Role::winding_ohm, 0.6 * start_ohm, 3.2 * start_ohm, "ohm");  // about -80 to 600 degC
+  log.of(Role::core) = std::move(log.of(Role::winding_ohm));
+  log.of(Role::winding_ohm).clear();
+  const double per_ohm = (1 + per_K * (start_degC - at_degC)) / start_ohm;
+  for (double& x : log.of(Role::core)) x = at_degC + (per_ohm * x - 1) / per_K;
+  log.notes.push_back(
+      fmt::format("winding_ohm is read as core_degC by copper's 0.393 %/K, from {:.4g} ohm at {:.1f} degC at the "
+                  "start, where the motor is taken to be as warm everywhere as its housing.",
+                  start_ohm, start_degC));
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name) {
   Log log;
@@ -250,14 +304,12 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
       to.clear();
       log.notes.push_back(
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
-    } else if (role == Role::winding_ohm) {
-      log.notes.push_back(
-          "winding_ohm is not used: a fit sees a resistance only as the temperature it means, core_degC.");
     }
   }
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;
+  read_resistance(log);
   return log;
 }
 

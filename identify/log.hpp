@@ -18,7 +18,8 @@
 
 namespace identify {
 
-/// What a column may be. Bus, board and winding_ohm are read and checked, and nothing is made of them yet.
+/// What a column may be. Bus and board are read and checked, and nothing is made of them yet; winding_ohm becomes core
+/// where the start of a log tells its temperature.
 enum class Role {
   time,
   current,

@@ -256,9 +256,39 @@ TEST(Reader, RowsOutsideOfEverySessionAreSaid) {
   ASSERT_EQ(logs.size(), 1u);
   says(logs[0].notes.back(), "1 rows without a session were left out");
 }
-TEST(Reader, AResistanceThatNothingIsMadeOfIsSaid) {
-  const Log log = read("time_s,current_A,housing_degC,winding_ohm\n0,1,20,0.5\n1,1,21,0.5\n")[0];
-  says(log.notes.front(), "winding_ohm is not used");
+/// Ten rows at rest, then a load; the winding read every third row.
+std::string resistance_log(double ambient_degC, double rest_A, const char* columns = "current_A,winding_ohm,bus_V") {
+  std::string text = std::string("time_s,housing_degC,ambient_degC,") + columns + "\n";
+  for (int i = 0; i < 40; ++i) {
+    text += std::to_string(i) + ",24.5," + std::to_string(ambient_degC) + "," + std::to_string(i < 10 ? rest_A : 3) +
+            "," +
+            (i % 3 != 0 ? ""
+             : i < 10   ? "0.500"
+                        : "0.600") +
+            ",0\n";
+  }
+  return text;
+}
+TEST(Reader, AResistanceIsReadAsATemperatureFromAStartAtRest) {
+  for (const char* columns : {"current_A,winding_ohm,bus_V", "power_W,winding_ohm,bus_V", "id_A,winding_ohm,iq_A"}) {
+    const Log log = read(resistance_log(24, 0, columns))[0];
+    EXPECT_NEAR(log.of(Role::core)[3], 24.5, 1e-9);
+    EXPECT_NEAR(log.of(Role::core)[30], 20 + (1.2 * (1 + 0.00393 * 4.5) - 1) / 0.00393, 1e-6);
+    EXPECT_TRUE(std::isnan(log.of(Role::core)[31])) << "a reading that was not taken";
+    ASSERT_FALSE(log.notes.empty());
+    says(log.notes.front(), "winding_ohm is read as core_degC by copper's 0.393 %/K, from 0.5 ohm at 24.5 degC");
+  }
+}
+TEST(Reader, AResistanceWhoseTemperatureIsKnownAtNoMomentIsSaidNotToBeUsed) {
+  for (const std::string& text : {resistance_log(20, 0), resistance_log(24, 3)}) {
+    const Log log = read(text)[0];
+    EXPECT_FALSE(log.has(Role::core));
+    says(log.notes.front(), "winding_ohm is not used");
+    says(log.notes.front(), "begin the log at rest");
+  }
+  std::string placeholder = resistance_log(24, 0);
+  placeholder.replace(placeholder.rfind("0.600"), 5, "0");
+  says(complaint(placeholder), "winding_ohm reaches 0;");
 }
 TEST(Reader, AFileThatIsNotThereIsAUsageError) {
   try {
