@@ -275,6 +275,31 @@ void read_resistance(Log& log) {
                   start_ohm, start_degC));
 }
 
+/// Columns that are read and checked, and that nothing comes of.
+void note_unused(Log& log) {
+  const auto names = [&](std::initializer_list<Role> roles) {
+    std::vector<std::string> there;
+    for (const Role role : roles) {
+      if (log.has(role)) there.push_back(own_name(role));
+    }
+    return there;
+  };
+  std::vector<std::string> unused = names({Role::bus_V, Role::bus_A, Role::board});
+  if (log.has(Role::winding_ohm) && log.has(Role::core)) unused.push_back(own_name(Role::winding_ohm));
+  if (log.has(Role::power)) {
+    const auto currents = names({Role::current, Role::id, Role::iq});
+    if (!currents.empty()) {
+      log.notes.push_back(fmt::format(
+          "power_W is taken for the heat, and not {}; to fit by the current instead, delete the power's column.",
+          fmt::join(currents, ", ")));
+    }
+  } else if (log.has(Role::id) && !log.has(Role::iq)) {
+    unused.push_back(own_name(Role::id));
+  }
+  if (!unused.empty())
+    log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name) {
   Log log;
@@ -310,6 +335,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;
   read_resistance(log);
+  note_unused(log);
   return log;
 }
 

@@ -290,6 +290,19 @@ TEST(Reader, AResistanceWhoseTemperatureIsKnownAtNoMomentIsSaidNotToBeUsed) {
   placeholder.replace(placeholder.rfind("0.600"), 5, "0");
   says(complaint(placeholder), "winding_ohm reaches 0;");
 }
+TEST(Reader, ColumnsThatNothingIsMadeOfAreSaidTogether) {
+  const Log log = read(
+      "time_s,current_A,housing_degC,bus_V,board_degC,id_A,core_degC,winding_ohm\n"
+      "0,1,20,24,30,0,20,1\n1,1,21,24,30,0,20,1\n")[0];
+  ASSERT_EQ(log.notes.size(), 1u);
+  says(log.notes[0], "bus_V, board_degC, winding_ohm, id_A are not used");
+  EXPECT_TRUE(read(head + "0,1,20\n1,1,21\n")[0].notes.empty());
+}
+TEST(Reader, ACurrentBesideAPowerIsSaidNotToBeTheHeat) {
+  const Log log = read("time_s,power_W,current_A,iq_A,housing_degC\n0,1,1,1,20\n1,1,1,1,21\n")[0];
+  ASSERT_EQ(log.notes.size(), 1u);
+  says(log.notes[0], "power_W is taken for the heat, and not current_A, iq_A");
+}
 TEST(Reader, AFileThatIsNotThereIsAUsageError) {
   try {
     identify::read_table("no/such/log.csv");
