@@ -122,18 +122,32 @@ std::string sentence(const Search& found, const Report& r) {
 
 /// What the logs do not hold, and the causes that could not be tried without it; empty when there are none.
 std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
-  const std::pair<Needs, Role> wanted[] = {
-      {Needs::speed, Role::speed}, {Needs::frame, Role::frame}, {Needs::neighbour, Role::neighbour}};
+  const auto lacking = [&](Role role) {
+    return std::none_of(logs.begin(), logs.end(), [&](const Log& log) { return log.has(role); });
+  };
+  const bool moves = problem.speed08_mean > 0;
+  const struct {
+    bool so;
+    const char* what;
+    std::vector<Needs> needs;
+  } gaps[] = {
+      {lacking(Role::speed), "speed_rad_per_s is missing", {Needs::speed}},
+      {!lacking(Role::speed) && !moves, "speed_rad_per_s never moves", {Needs::speed}},
+      {lacking(Role::frame), "frame_degC is missing", {Needs::frame}},
+      {lacking(Role::neighbour), "neighbour_housing_degC is missing", {Needs::neighbour}},
+      // What needs a speed, and cannot be tried although it moves, needs a current as well.
+      {problem.heated_by_power(),
+       "power_W tells no current",
+       {moves ? Needs::speed : Needs::current, Needs::current, Needs::signed_current, Needs::copper}},
+  };
   std::string out;
-  for (const auto& [needs, role] : wanted) {
-    const bool there = std::any_of(logs.begin(), logs.end(), [role = role](const Log& log) { return log.has(role); });
+  for (const auto& gap : gaps) {
     std::vector<std::string> ids;
     for (const Cause& cause : causes()) {
-      if (cause.needs == needs && !problem.possible(cause)) ids.emplace_back(cause.id);
+      const bool concerned = std::count(gap.needs.begin(), gap.needs.end(), cause.needs) > 0;
+      if (gap.so && concerned && !problem.possible(cause)) ids.emplace_back(cause.id);
     }
-    if (!ids.empty() && (!there || needs == Needs::speed))
-      out += fmt::format("{}{} {} ({})", out.empty() ? "" : "; ", own_name(role), there ? "never moves" : "is missing",
-                         listed(ids, ", "));
+    if (!ids.empty()) out += fmt::format("{}{} ({})", out.empty() ? "" : "; ", gap.what, listed(ids, ", "));
   }
   return out.empty() ? out : "Not tried, since a column does not tell: " + out + ".";
 }

@@ -372,6 +372,20 @@ TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
   EXPECT_NE(stands.out.find("speed_rad_per_s never moves ("), std::string::npos) << stands.out;
 }
 
+TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
+  tests::BenchOptions options;
+  options.power_gain = 1;
+  auto logs = bench_logs({options});
+  auto& speed = logs[0].of(identify::Role::speed);
+  for (std::size_t i = 0; i < speed.size(); ++i) speed[i] = i / 500 % 2 == 0 ? 100 : 0;
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  std::string said;
+  for (const auto& lines : {report.notes, report.reasoning})
+    for (const std::string& line : lines) said += line + "\n";
+  EXPECT_EQ(said.find("never moves"), std::string::npos) << said;
+  EXPECT_NE(said.find("power_W tells no current (ac_copper_loss, "), std::string::npos) << said;
+}
+
 TEST(BadInput, TwoClocksTwoMinutesApart) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   std::vector<std::string> earlier;
