@@ -263,13 +263,13 @@ Bins bins_of(const Log& log, double finest_s) {
   const auto refuse = [&](const std::string& what) {
     throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
   };
+  if (t.size() > 1 && !(usual_s > 0))
+    refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
   if (t.size() < 30)
     refuse(
         fmt::format("only {} row{} over {:.1f} s, and 30 are the least to fit a motor; record more of them (a "
                     "temperature that was read now and then may leave its cell empty).",
                     t.size(), t.size() == 1 ? "" : "s", t.back()));
-  if (!(usual_s > 0))
-    refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
   out.interval_s = usual_s;
   out.width_s = width_s_of(log, usual_s, finest_s);
   const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);

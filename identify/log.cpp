@@ -212,14 +212,54 @@ void check_order(const Log& log) {
 
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
   const auto& t = log.of(Role::time);
+  std::vector<std::size_t> falls;
+  std::vector<double> spacing_s;
   for (std::size_t i = 1; i < t.size(); ++i) {
-    if (t[i] < t[i - 1]) {
-      throw UserError(Exit::unusable, fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s (two "
-                                                  "recordings joined, or two clocks); split the "
-                                                  "file there or give it a session column.",
-                                                  table.file, table.line[rows[i]], t[i - 1], t[i]));
-    }
+    if (t[i] < t[i - 1]) falls.push_back(i);
+    spacing_s.push_back(t[i] - t[i - 1]);
   }
+  if (falls.empty()) return;
+  constexpr double correction_s = 5;  // a clock that is set right by another jumps by less
+  const std::size_t first = falls.front();
+  const std::string what_to_do =
+      *std::min_element(spacing_s.begin(), spacing_s.end()) < -correction_s
+          ? "(two recordings joined, or two clocks); split the file there or give it a session column"
+      : falls.size() > 2
+          ? fmt::format("and in {} places (rows out of order); sort the rows by time", falls.size())
+          : fmt::format(
+                "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
+                "the file there",
+                t[first - 1] - t[first] + median(spacing_s));
+  throw UserError(Exit::unusable, fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.",
+                                              table.file, table.line[rows[first]], t[first - 1], t[first], what_to_do));
+}
+
+/// Takes rows away that say again, time and all, what the row before them says; how many.
+std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, const std::vector<double>& time) {
+  const auto same = [&](std::size_t a, std::size_t b) {
+    return time[a] == time[b] && std::all_of(table.columns.begin(), table.columns.end(), [&](const auto& column) {
+             return column[a] == column[b] || (std::isnan(column[a]) && std::isnan(column[b]));
+           });
+  };
+  const auto end = std::unique(rows.begin(), rows.end(), same);
+  const auto repeated = static_cast<std::size_t>(rows.end() - end);
+  rows.erase(end, rows.end());
+  return repeated;
+}
+
+/// A time of day that falls by half a day or more has passed midnight.
+void pass_midnights(Log& log) {
+  constexpr double day_s = 86400;
+  double before_s = 0;
+  int midnights = 0;
+  for (double& t : log.of(Role::time)) {
+    midnights += before_s - t > day_s / 2;
+    before_s = t;
+    t += day_s * midnights;
+  }
+  if (midnights > 0)
+    log.notes.push_back(fmt::format("The clock passes midnight {} time{}; a day is added each time.", midnights,
+                                    midnights == 1 ? "" : "s"));
 }
 
 /// How many rows come before the first heat. One part in a thousand of the most is a sensor's offset.
@@ -315,6 +355,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   }
   if (rows.size() < chosen.size())
     log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
+  if (const std::size_t repeated = drop_repeated(rows, table, time); repeated > 0)
+    log.notes.push_back(fmt::format("Rows that are the same as the row before were left out: {}.", repeated));
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
     const auto& from = table.columns[static_cast<std::size_t>(table.find(source.column))];
@@ -331,6 +373,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
+  if (table.of_day[static_cast<std::size_t>(table.find(found.at(Role::time).column))]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;

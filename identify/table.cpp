@@ -116,7 +116,7 @@ bool moment(std::string_view s, double& value) {
     ahead_s = (clock[sign] == '-' ? -60 : 60) * (60 * hours + minutes);
     clock = clock.substr(0, sign);
   }
-  if (!date.ok() || !time_of_day(clock, value)) return false;
+  if (!date.ok() || !time_of_day(trimmed(clock), value)) return false;
   value += 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) - ahead_s;
   return true;
 }
@@ -215,6 +215,7 @@ Table read_table(const std::string& path) {
       for (const auto name : header) table.names.emplace_back(trimmed(name));
       table.columns.resize(table.names.size());
       table.complaints.resize(table.names.size());
+      table.of_day.resize(table.names.size());
       if (!numbers) continue;
     }
     // A separator at the end of every row is some loggers' habit; one cell too many and empty is not a mistake.
@@ -241,6 +242,8 @@ Table read_table(const std::string& path) {
                                         shown(cells[c]), shown(table.names[c])));
       }
       table.columns[c].push_back(value);
+      double unused = 0;
+      if (time_of_day(cells[c], unused)) table.of_day[c] = true;
     }
     table.line.push_back(line);
   }

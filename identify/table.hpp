@@ -23,6 +23,7 @@ struct Table {
   std::vector<std::string> units;            // as a row below the header gives them; empty without such a row
   std::vector<std::vector<double>> columns;  // columns[c][row]
   std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
+  std::vector<bool> of_day;                  // for each column: a cell of it is a time of day, without a date
   std::vector<int> line;                     // line number of each row, for sentences
 
   std::size_t rows() const { return line.size(); }

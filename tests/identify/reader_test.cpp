@@ -102,9 +102,27 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
   EXPECT_NEAR(time_s("2025-12-31T23:59:59.5", "2026-01-01T00:00:01"), 1.5, 1e-6);
   EXPECT_NEAR(time_s("2024-02-28 12:00:00Z", "2024-03-01 12:00:00Z"), 2 * 86400, 1e-6) << "a leap year";
   EXPECT_NEAR(time_s("2025-06-01T10:00:00+02:00", "2025-06-01T08:00:30Z"), 30, 1e-6);
+  EXPECT_NEAR(time_s("2025-06-01 10:00:00 +0200", "2025-06-01 08:00:30 Z"), 30, 1e-6);
   EXPECT_NEAR(time_s("09:59:58", "10:00:00.25"), 2.25, 1e-9);
   for (const char* not_a_time : {"2025-13-01T00:00:00", "2025-06-31T00:00:00", "10:00", "noon", "2025-06-01"})
     says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
+}
+
+TEST(Reader, AClockThatPassesMidnightGoesOn) {
+  const Log log = read(head + "23:59:59,1,20\n00:00:01,1,20\n23:00:00,1,20\n00:00:02,2,21\n")[0];
+  EXPECT_NEAR(log.of(Role::time)[1], 2, 1e-9);
+  EXPECT_NEAR(log.of(Role::time)[3], 86403, 1e-9);
+  ASSERT_FALSE(log.notes.empty());
+  says(log.notes[0], "passes midnight 2 times");
+  says(complaint(head + "10:00:00,1,20\n09:00:00,1,20\n"), "time runs backwards");
+  says(complaint(head + "86399,1,20\n1,1,20\n"), "time runs backwards");
+}
+
+TEST(Reader, ARowWrittenTwiceCountsOnce) {
+  const Log log = read(head + "0,1,20\n1,1,20\n1,1,20\n1,1,20\n1,1,21\n2,1,21\n")[0];
+  EXPECT_EQ(log.of(Role::time).size(), 4u);
+  ASSERT_FALSE(log.notes.empty());
+  says(log.notes[0], "Rows that are the same as the row before were left out: 2.");
 }
 
 TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
@@ -198,6 +216,19 @@ TEST(Reader, AMappedColumnThatIsNotThereIsNamedWithTheNearest) {
 }
 TEST(Reader, TimeThatRunsBackwardsIsRefusedWithItsLine) {
   says(complaint(head + "0,1,20\n1,1,20\n0.5,1,20\n2,1,20\n"), "line 4: time runs backwards from 1 to 0.5 s");
+}
+TEST(Reader, WhatToDoAboutTimeThatRunsBackwardsGoesByHowItDoes) {
+  std::string set = head, mixed = head, joined = head;
+  for (int i = 0; i < 40; ++i) {
+    const std::string rest = ",1," + std::to_string(20 + i) + "\n";
+    set += std::to_string(i < 20 ? i : i - 3) + rest;
+    mixed += std::to_string(i ^ 1) + rest;
+    joined += std::to_string(i % 20) + rest;
+  }
+  says(complaint(set),
+       "line 22: time runs backwards from 19 to 17 s (a clock that was set while it recorded); add 3 s to the times");
+  says(complaint(mixed), "in 20 places (rows out of order); sort the rows by time");
+  says(complaint(joined), "split the file there or give it a session column");
 }
 TEST(Reader, AHeaderInAnotherUnitIsRefusedWithTheConversion) {
   says(complaint("time_s,current_mA,housing_degC\n0,1,20\n"), "--column current_A=current_mA:mA");
