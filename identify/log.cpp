@@ -46,12 +46,20 @@ Role role_named(const std::string& name, const std::string& where) {
 /// silently ignored column.
 std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
   std::map<Role, Source> found;
-  for (const auto& [role, source] : map.columns) {
+  for (auto [role, source] : map.columns) {
+    // "T:K" may be a name as a whole, and says the unit all the same.
+    if (table.find(source.column) < 0 && table.find(source.said) >= 0) source.column = source.said;
     if (table.find(source.column) < 0) {
-      throw UserError(Exit::unusable,
-                      fmt::format("{}: column '{}' for {} is missing{} (the file has: {}).", table.file, source.column,
-                                  own_name(role), wire::pc::did_you_mean(source.column, table.names),
-                                  fmt::join(table.names, ", ")));
+      const std::size_t colon = source.column.rfind(':');
+      const std::string no_unit =
+          source.unit_said || colon == std::string::npos
+              ? ""
+              : fmt::format(", and '{}' is no unit for a column '{}' (units: {})", source.column.substr(colon + 1),
+                            source.column.substr(0, colon), fmt::join(unit_names(), ", "));
+      throw UserError(Exit::usage,
+                      fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file,
+                                  source.column, own_name(role), wire::pc::did_you_mean(source.column, table.names),
+                                  no_unit, fmt::join(table.names, ", ")));
     }
     found[role] = source;
   }
@@ -402,8 +410,11 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   if (rest.empty() || colon == 0) {
     throw UserError(Exit::usage, where + ": the column's name is missing behind '='.");
   }
-  Source source{rest.substr(0, colon)};
-  if (colon != std::string::npos) {
+  Source source{rest};
+  source.said = rest;
+  // What is no unit belongs to the column's name.
+  if (colon != std::string::npos && unit_named(rest.substr(colon + 1))) {
+    source.column = rest.substr(0, colon);
     apply_unit(rest.substr(colon + 1), own_name(role), where, Exit::usage, source.factor, source.offset);
     source.unit_said = true;
   }

@@ -52,6 +52,7 @@ struct Source {
   std::string column;
   double factor = 1, offset = 0;  // SI = factor * (cell + offset)
   bool unit_said = false;         // else a row of units in the table may say it
+  std::string said = "";          // column and unit as they were written
 };
 
 /// Which column plays which role, and how its unit becomes ours.
