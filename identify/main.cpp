@@ -137,8 +137,17 @@ void show(const std::string& text) {
     throw UserError(Exit::usage, "standard output: cannot be written; the answer is not complete.");
 }
 
+/// Asked before the search, which may take minutes.
+void need_folder_of(const std::string& path) {
+  const auto folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw UserError(Exit::usage,
+                    fmt::format("{}: there is no folder {}; make it, or choose another place.", path, folder.string()));
+}
+
 int answer(Arguments a) {
   take_columns_from_logs(a);
+  for (const std::string& path : {a.html, a.json, a.write_model, a.write_baseline}) need_folder_of(path);
   std::optional<wire::pc::MotorFile> motor;
   if (!a.motor.empty()) {
     const char* folder = std::getenv("HOTCORE_MOTORS");

@@ -540,6 +540,19 @@ TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
   EXPECT_NE(r.out.find("not written: the log tells a power"), std::string::npos) << r.out;
 }
 
+TEST(Program, AFolderThatIsNotThereIsNotMade) {
+  tests::BenchOptions options;
+  options.seconds = 60;
+  const std::string log = tests::write_bench_log("hotcore_folder.csv", options);
+  const std::string folder = (std::filesystem::temp_directory_path() / "hotcore_no_such").string();
+  for (const char* option : {"--json", "--html", "--write-model", "--write-baseline"}) {
+    const Outcome r = run(log + " " + option + " " + folder + "/x");
+    EXPECT_EQ(r.code, 2);
+    EXPECT_NE(r.out.find("there is no folder " + folder), std::string::npos) << r.out;
+    EXPECT_FALSE(std::filesystem::exists(folder));
+  }
+}
+
 TEST(Program, AWrongOptionIsUsage) {
   EXPECT_EQ(run("--nonsense").code, 2);
   EXPECT_EQ(run("").code, 2);
