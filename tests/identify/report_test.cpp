@@ -14,6 +14,7 @@
 #include "identify/discover.hpp"
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
+#include "identify/parallel.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "tests/identify/slow_build.hpp"
@@ -551,6 +552,10 @@ TEST(Program, AFolderThatIsNotThereIsNotMade) {
     EXPECT_NE(r.out.find("there is no folder " + folder), std::string::npos) << r.out;
     EXPECT_FALSE(std::filesystem::exists(folder));
   }
+}
+
+TEST(Program, WhatAThreadThrowsReachesTheCaller) {
+  EXPECT_THROW(identify::in_parallel(100, [](std::size_t) { throw std::runtime_error("part"); }), std::runtime_error);
 }
 
 TEST(Program, AWrongOptionIsUsage) {
