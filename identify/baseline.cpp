@@ -166,10 +166,9 @@ void judge_baseline(const Problem& problem, const Fit& f, const std::vector<Log>
     report.notes.push_back(
         problem.heated_by_power()
             ? "No motor file was given: the starting values come from the data, and priors are a factor of ten wide."
-            : "No motor file was given: the winding's resistance is taken as 1 ohm (3/2 of a phase's) and its "
-              "coefficient as copper's; R1 and R2 then come out times the true resistance, C1 and C2 divided by it. "
-              "Priors are a factor of ten "
-              "wide.");
+            : "No motor file was given: the winding's resistance is taken as 1 ohm (it stands for 3/4 of the "
+              "resistance between two terminals, 3/2 of a phase's) and its coefficient as copper's; R1 and R2 come out "
+              "multiplied by the true one in ohm, C1 and C2 divided by it. Priors are a factor of ten wide.");
   }
   report.structure = structure(problem, f);
   report.baseline_rmse = rmse_of(problem, f);

@@ -219,9 +219,13 @@ int main(int argc, char** argv) {
   for (const char* other : {"--hold-out", "--json", "--html", "--write-model", "--write-baseline", "--explain"})
     score->excludes(other);
   app.footer(
-      "What a column may be (--column ROLE=NAME or ROLE=NAME:UNIT; a column called like its role needs no word):\n" +
+      "What a column may be (--column ROLE=NAME or ROLE=NAME:UNIT, with the UNIT where a NAME ends like one, as in "
+      "housing_degC=T:1:degC; a column called like its role needs no word):\n" +
       identify::roles_and_units() +
       "\n\n"
+      "current_A: the direct current that heats alike through two terminals. Of sinusoidal phase currents it is "
+      "sqrt(3)/2 of their amplitude, 1.22 times their rms. iq_A, id_A: amplitudes. power_W: what heats the winding; "
+      "taken before any current. winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
       "error says why.");

@@ -126,9 +126,8 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
   const thermal::HeatSet<double> set = heat_set_of(problem, f);
   std::string s = "# " + sentence + "\n";
   if (!problem.belief.known && !problem.heated_by_power())
-    s +=
-        "# No motor file was given: the winding counts as 1 ohm. With its true 3/2 phase resistance g, multiply gains, "
-        "conductances and capacities by g.\n";
+    s += "# No motor file was given: the winding counts as 1 ohm. With its true g (3/4 of the resistance between two "
+         "terminals, 3/2 of a phase's), multiply gains, conductances and capacities by g.\n";
   s += "format = 1\n";
   for (int i = 0; i < set.node_count; ++i) {
     s += fmt::format("\n[[node]]  # {}: {}\ncapacity_J_per_K = {:.6g}\n", i,

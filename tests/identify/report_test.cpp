@@ -241,6 +241,14 @@ TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
             1);
 }
 
+TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
+  tests::BenchOptions options;
+  options.seconds = 120;
+  std::string said;
+  for (const std::string& note : identify::discover(bench_logs({options}), std::nullopt).notes) said += note + "\n";
+  EXPECT_NE(said.find("3/4 of the resistance between two terminals, 3/2 of a phase's"), std::string::npos) << said;
+}
+
 TEST(Report, WhatIsAdequateHasNothingToGain) {
   tests::BenchOptions options;
   options.core_every_s = 20;
