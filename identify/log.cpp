@@ -295,17 +295,18 @@ void read_resistance(Log& log) {
   constexpr double soaked_K = 1;                   // two sensors beside each other differ by as much
   if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
   const std::size_t rest = rows_at_rest(log);
-  const auto at_start = [&](Role role) {
+  const auto at_rest = [&](Role role) {
     std::vector<double> first;
     for (std::size_t i = 0; log.has(role) && i < rest && first.size() < 5; ++i) {
       if (!std::isnan(log.of(role)[i])) first.push_back(log.of(role)[i]);
     }
-    return median(first);
+    return first;
   };
-  const double start_ohm = at_start(Role::winding_ohm), start_degC = at_start(Role::housing);
+  const std::vector<double> readings_ohm = at_rest(Role::winding_ohm);
+  const double start_ohm = median(readings_ohm), start_degC = median(at_rest(Role::housing));
   bool soaked = start_ohm > 0 && !std::isnan(start_degC);
   for (const Role role : {Role::ambient, Role::coolant})
-    soaked = soaked && (!log.has(role) || std::abs(at_start(role) - start_degC) <= soaked_K);
+    soaked = soaked && (!log.has(role) || std::abs(median(at_rest(role)) - start_degC) <= soaked_K);
   if (!soaked) {
     log.notes.push_back(
         "winding_ohm is not used, since its temperature is known at no moment: begin the log at rest with a reading of "
@@ -319,8 +320,8 @@ void read_resistance(Log& log) {
   for (double& x : log.of(Role::core)) x = at_degC + (per_ohm * x - 1) / per_K;
   log.notes.push_back(
       fmt::format("winding_ohm is read as core_degC by copper's 0.393 %/K, from {:.4g} ohm at {:.1f} degC at the "
-                  "start, where the motor is taken to be as warm everywhere as its housing.",
-                  start_ohm, start_degC));
+                  "start ({} reading{}), where all of the motor is taken to be as warm as its housing.",
+                  start_ohm, start_degC, readings_ohm.size(), readings_ohm.size() == 1 ? "" : "s"));
 }
 
 /// Columns that are read and checked, and that nothing comes of.

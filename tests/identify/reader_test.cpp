@@ -321,7 +321,8 @@ TEST(Reader, AResistanceIsReadAsATemperatureFromAStartAtRest) {
     EXPECT_NEAR(log.of(Role::core)[30], 20 + (1.2 * (1 + 0.00393 * 4.5) - 1) / 0.00393, 1e-6);
     EXPECT_TRUE(std::isnan(log.of(Role::core)[31])) << "a reading that was not taken";
     ASSERT_FALSE(log.notes.empty());
-    says(log.notes.front(), "winding_ohm is read as core_degC by copper's 0.393 %/K, from 0.5 ohm at 24.5 degC");
+    says(log.notes.front(),
+         "winding_ohm is read as core_degC by copper's 0.393 %/K, from 0.5 ohm at 24.5 degC at the start (4 readings)");
   }
 }
 TEST(Reader, AResistanceWhoseTemperatureIsKnownAtNoMomentIsSaidNotToBeUsed) {
