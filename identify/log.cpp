@@ -294,6 +294,12 @@ void read_resistance(Log& log) {
   constexpr double per_K = 0.00393, at_degC = 20;  // copper
   constexpr double soaked_K = 1;                   // two sensors beside each other differ by as much
   if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
+  std::vector<double>& ohm = log.of(Role::winding_ohm);
+  const auto nothing = std::count_if(ohm.begin(), ohm.end(), [](double x) { return x <= 0; });
+  std::replace_if(
+      ohm.begin(), ohm.end(), [](double x) { return x <= 0; }, missing);
+  if (nothing > 0)
+    log.notes.push_back(fmt::format("Cells of winding_ohm that say 0 or less are taken for no reading: {}.", nothing));
   const std::size_t rest = rows_at_rest(log);
   const auto at_rest = [&](Role role) {
     std::vector<double> first;
@@ -304,7 +310,7 @@ void read_resistance(Log& log) {
   };
   const std::vector<double> readings_ohm = at_rest(Role::winding_ohm);
   const double start_ohm = median(readings_ohm), start_degC = median(at_rest(Role::housing));
-  bool soaked = start_ohm > 0 && !std::isnan(start_degC);
+  bool soaked = !readings_ohm.empty() && !std::isnan(start_degC);
   for (const Role role : {Role::ambient, Role::coolant})
     soaked = soaked && (!log.has(role) || std::abs(median(at_rest(role)) - start_degC) <= soaked_K);
   if (!soaked) {
@@ -313,9 +319,8 @@ void read_resistance(Log& log) {
         "it and all at room temperature, or convert it to core_degC yourself.");
     return;
   }
-  check_range(log, Role::winding_ohm, 0.6 * start_ohm, 3.2 * start_ohm, "ohm");  // about -80 to 600 degC
-  log.of(Role::core) = std::move(log.of(Role::winding_ohm));
-  log.of(Role::winding_ohm).clear();
+  log.of(Role::core) = std::move(ohm);
+  ohm.clear();
   const double per_ohm = (1 + per_K * (start_degC - at_degC)) / start_ohm;
   for (double& x : log.of(Role::core)) x = at_degC + (per_ohm * x - 1) / per_K;
   log.notes.push_back(
