@@ -387,6 +387,11 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
+  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power)) {
+    throw UserError(Exit::unusable, name +
+                                        ": the heat input (current_A, iq_A or power_W) has no value at all; record "
+                                        "the log again.");
+  }
   if (table.of_day[static_cast<std::size_t>(table.find(found.at(Role::time).column))]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();

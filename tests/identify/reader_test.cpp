@@ -295,7 +295,10 @@ TEST(Reader, MessagesThatCameOneARowAreJudgedByTheirOwnInterval) {
   EXPECT_LT(read(merged)[0].missing_share, 0.05);
   says(complaint(torn), "is missing in 6");
 }
-TEST(Reader, AColumnOfNothingCountsAsMissing) { says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature"); }
+TEST(Reader, AColumnOfNothingCountsAsMissing) {
+  says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature");
+  says(complaint(head + "0,,20\n1,nan,20\n2,,21\n"), "the heat input (current_A, iq_A or power_W) has no value");
+}
 TEST(Reader, RowsOutsideOfEverySessionAreSaid) {
   const auto logs = read("session,time_s,current_A,housing_degC\n1,0,1,20\n,1,1,20\n1,2,1,21\n");
   ASSERT_EQ(logs.size(), 1u);
