@@ -84,7 +84,7 @@ identify(power_held_out_of_current 3 "watts.csv: its heat" fine.csv --hold-out w
 identify(one_log_twice 2 "named twice" fine.csv fine.csv)
 identify(column_without_a_name 2 "the column's name is missing" fine.csv --column housing_degC=)
 identify(no_folder_for_the_model 2 "there is no folder /proc/nowhere" fine.csv --write-model /proc/nowhere/model.toml)
-identify(no_place_for_the_model 2 "cannot be written" fine.csv --write-model /proc/model.toml)
+refuse(no_place_for_the_answer 2 "cannot be written" ${IDENTIFY} fine.csv --json /proc/answer.json)
 identify(score_and_an_answer 2 "excludes --score" fine.csv --score fine.csv)
 refuse(score_without_truth 2 "truth.json: there is no such file" ${IDENTIFY} fine.csv --score truth.json)
 refuse(full_device 2 "standard output: cannot be written" sh -c "${IDENTIFY} fine.csv --json - > /dev/full")
