@@ -38,7 +38,8 @@ struct Known {
 struct Case {
   std::uint64_t seed;
   std::string truth, answer;
-  bool misnamed;  // told what it is, and the truth is not in it; or, with nothing hidden, anything but adequate
+  bool named;     // told what it is, or most of it
+  bool misnamed;  // named, and the truth is not in it; or, with nothing hidden, anything but adequate
   Push before, after;
   Known R1, C1;  // of the model found
 };
@@ -76,10 +77,12 @@ Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::st
   const auto known = [&](std::size_t i, double truth) {
     return Known{found[i].value / truth - 1, found[i].std_error / found[i].value};
   };
+  const bool named = report.verdict.ends_with("explained");
   Case c{.seed = seed,
          .truth = clean ? "nothing" : nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
          .answer = report.verdict,
-         .misnamed = clean ? report.verdict != "adequate" : report.verdict.ends_with("explained"),
+         .named = named,
+         .misnamed = clean ? report.verdict != "adequate" : named,
          .before = outcome(before),
          .after = outcome(after),
          .R1 = known(0, motor.motor.R1_K_per_W),
@@ -121,7 +124,7 @@ int main(int argc, char** argv) {
     helped += !c.before.kept() && c.after.kept();
     const bool hotter = c.after.overshoot_K > std::max(most_overshoot_K, c.before.overshoot_K);
     harmed += (c.before.kept() && !c.after.kept()) || hotter;
-    too_hot += c.answer.starts_with("explained") && c.after.overshoot_K > most_overshoot_K;
+    too_hot += c.named && c.after.overshoot_K > most_overshoot_K;
     misnamed += c.misnamed;
     list.push_back({{"seed", c.seed},
                     {"truth", c.truth},
