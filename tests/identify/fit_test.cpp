@@ -46,16 +46,19 @@ TEST(Dual, DerivativesAreExact) {
   EXPECT_NEAR(y.slope(1), (f(1.3, 0.7 + h) - f(1.3, 0.7 - h)) / (2 * h), 1e-8);
 }
 
-TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
+/// A log in which every cause but those that another heater needs shows.
+Problem with_all_drives(double power_gain) {
   tests::BenchOptions options = off_sheet(3);
   options.seconds = 300;
   options.rate_Hz = 5;
+  options.power_gain = power_gain;
   Problem problem = problem_from(options);
-  problem.speed08_mean = 40;  // the speed causes are exercised as well
+  problem.speed08_mean = 40;
   for (auto& bin : problem.logs[0].bins) {
     const double w = 50 + 40 * std::sin(0.05 * static_cast<double>(&bin - problem.logs[0].bins.data()));
     bin.input[thermal::Drive::speed_rad_per_s] = w;
     bin.input[thermal::Drive::speed2_rad2_per_s2] = w * w;
+    bin.input[thermal::Drive::speed3_rad3_per_s3] = w * w * w;
     bin.input[thermal::Drive::speed_to_0_8] = std::pow(w, 0.8);
     bin.input[thermal::Drive::current_speed] = w * bin.input[thermal::Drive::current_A];
     bin.input[thermal::Drive::current2_speed2] = w * w * bin.input[thermal::Drive::current_A2];
@@ -66,9 +69,15 @@ TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
     for (const auto& bin : problem.logs[0].bins)
       problem.drive_mean[d] += bin.input.drive[d] / static_cast<double>(problem.logs[0].bins.size());
   }
+  return problem;
+}
+
+TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
+  const Problem by_current = with_all_drives(0), by_power = with_all_drives(1);
   for (std::size_t c = 0; c < identify::causes().size(); ++c) {
     const std::vector<Chosen> chosen = {{static_cast<int>(c), 0}};
     const auto& cause = identify::causes()[c];
+    const Problem& problem = cause.needs == identify::Needs::several_powers ? by_power : by_current;
     const auto n = static_cast<Eigen::Index>(identify::base_count + cause.parameters.size() + identify::per_log_count);
     Eigen::VectorXd x(n), gradient;
     x.head(4) << std::log(1.4), std::log(13.0), std::log(1.0), std::log(21.0);
@@ -80,6 +89,9 @@ TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
     }
     x.tail(2) << 24.5, 0.3;
     ASSERT_LT(identify::misfit_at(problem, chosen, x, &gradient), 1e200) << cause.id;
+    for (std::size_t p = 0; p < cause.parameters.size(); ++p)
+      EXPECT_GT(std::abs(gradient[identify::base_count + static_cast<Eigen::Index>(p)]), 1)
+          << cause.id << " does nothing here";
     for (Eigen::Index i = 0; i < n; ++i) {
       Eigen::VectorXd up = x, down = x;
       const double h = 1e-5;
