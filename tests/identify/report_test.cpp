@@ -440,7 +440,7 @@ TEST(BadInput, CurrentAndSpeedSwapped) {
             row[1] = number / 300 % 2 == 0 ? "0" : "2.5";
             return true;
           }),
-          "swapped");
+          "follow the square of the speed column and not that of the current: the two columns are swapped");
 }
 
 TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
