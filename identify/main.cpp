@@ -92,10 +92,14 @@ std::vector<std::string> truth_in(const std::string& path) {
   return ids;
 }
 
+bool names(const identify::Report& report) {
+  return report.verdict == "explained" || report.verdict == "partly_explained";
+}
+
 const char* outcome_of(const identify::Report& report, const std::vector<std::string>& named,
                        const std::vector<std::string>& truth) {
   const std::string& verdict = report.verdict;
-  if (verdict == "explained" || verdict == "partly_explained") return named == truth ? "named right" : "named wrong";
+  if (names(report)) return named == truth ? "named right" : "named wrong";
   if (verdict == "ambiguous") {
     const bool among = std::find(report.tied.begin(), report.tied.end(), truth) != report.tied.end();
     return among ? "tied with the truth" : "tied without it";
@@ -104,7 +108,24 @@ const char* outcome_of(const identify::Report& report, const std::vector<std::st
   return "unknown or insufficient";
 }
 
-/// Answers each log by itself, and only then opens its truth: one line a log, then how often each outcome came.
+/// How often each answer was given to each truth. Columns have numbers, for names are long.
+void print_confusions(const std::map<std::string, std::map<std::string, int>>& answers_to) {
+  std::map<std::string, int> columns;
+  for (const auto& [truth, answers] : answers_to) columns.insert(answers.begin(), answers.end());
+  int number = 0;
+  fmt::print("\n{:<40}", "truth \\ answer");
+  for (auto& [answer, column] : columns) fmt::print("{:>4}", column = ++number);
+  for (const auto& [truth, answers] : answers_to) {
+    fmt::print("\n{:<40}", truth);
+    for (const auto& [answer, column] : columns)
+      fmt::print("{:>4}", answers.contains(answer) ? std::to_string(answers.at(answer)) : ".");
+  }
+  fmt::print("\n");
+  for (const auto& [answer, column] : columns) fmt::print("{:>4}  {}\n", column, answer);
+}
+
+/// Answers each log by itself, and only then opens its truth: one line a log, then how often each outcome came,
+/// and what was taken for what.
 int score(const Arguments& a, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
   if (a.truths.size() != a.logs.size()) {
     throw UserError(Exit::usage,
@@ -116,6 +137,7 @@ int score(const Arguments& a, const identify::ColumnMap& map, const std::optiona
       throw UserError(Exit::usage, "--score: " + path + ": there is no such file; check the path.");
   }
   std::map<std::string, int> outcomes;
+  std::map<std::string, std::map<std::string, int>> answers_to;
   fmt::print("{:<40} {:<32} {:<18} {}\n", "log", "truth", "verdict", "answer");
   for (std::size_t i = 0; i < a.logs.size(); ++i) {
     const identify::Report report = identify::discover(read(a.logs[i], map, motor), motor);
@@ -124,11 +146,14 @@ int score(const Arguments& a, const identify::ColumnMap& map, const std::optiona
     for (const auto& cause : report.causes) named.push_back(cause.id);
     std::sort(named.begin(), named.end());
     const std::string outcome = outcome_of(report, named, truth);
+    const std::string hidden = fmt::format("{}", fmt::join(truth, " + ")),
+                      name = fmt::format("{}", fmt::join(named, " + "));
     ++outcomes[outcome];
-    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], fmt::format("{}", fmt::join(truth, " + ")), report.verdict,
-               fmt::join(named, " + "), outcome);
+    ++answers_to[hidden.empty() ? "nothing" : hidden][names(report) ? name : report.verdict];
+    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], hidden, report.verdict, name, outcome);
   }
   for (const auto& [outcome, count] : outcomes) fmt::print("{:>5}  {}\n", count, outcome);
+  print_confusions(answers_to);
   return 0;
 }
 
@@ -215,7 +240,7 @@ int main(int argc, char** argv) {
                  "the same of the two-resistor model as fitted, to compare on the board with what was found");
   auto* score = app.add_option("--score", a.truths,
                                "truth files, one a log in the same order: answer each log by itself and print how "
-                               "often that was right");
+                               "often that was right, and what was taken for what");
   for (const char* other : {"--hold-out", "--json", "--html", "--write-model", "--write-baseline", "--explain"})
     score->excludes(other);
   app.footer(

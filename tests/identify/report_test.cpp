@@ -585,6 +585,30 @@ TEST(Program, ColumnsMayFollowOneWord) {
   EXPECT_EQ(run("--column ambient_degC=sky coolant_degC=sea").code, 2) << "no log";
 }
 
+TEST(Program, AScoreEndsWithWhatWasTakenForWhat) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  const std::string clean = tests::write_bench_log("hotcore_scored.csv", options);
+  options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
+  const std::string board = tests::write_bench_log("hotcore_scored_board.csv", options);
+  const auto truth = [](const std::string& path, const char* ids) {
+    std::ofstream(path + ".json") << "{\"causes\": [" << ids << "]}";
+    return path + ".json";
+  };
+  const std::string none = truth(clean, ""), heat = truth(board, R"({"id": "board_heat"})"),
+                    drag = truth(clean + "2", R"({"id": "windage"})");
+  const Outcome r = run(clean + " " + board + " " + clean + " " + clean + " --motor ec-16-40w --score " + none + " " +
+                        heat + " " + drag + " " + none);
+  EXPECT_EQ(r.code, 0) << r.out;
+  const auto row = [](const std::string& first, const char* counts) {
+    return first + std::string(40 - first.size(), ' ') + counts + "\n";
+  };
+  const std::string table = row("truth \\ answer", "   1   2") + row("board_heat", "   .   1") +
+                            row("nothing", "   2   .") + row("windage", "   1   .") +
+                            "   1  adequate\n   2  board_heat\n";
+  EXPECT_NE(r.out.find(table), std::string::npos) << r.out;
+}
+
 TEST(Program, ALogWithoutLoadCannotBeUsed) {
   tests::BenchOptions options;
   options.seconds = 120;
