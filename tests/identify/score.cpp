@@ -3,7 +3,8 @@
 //   build/host/bin/score                            the whole table, hours; --seeds 2 for a first look
 //   build/host/bin/score designed-sparse outside-duty --seeds 3 --verbose
 //   build/host/bin/score --list                     the rows
-// With --check the end is an error when a row falls below its floor beyond bad luck. Seeds rotate with HOTCORE_SEED.
+// With --check the end is an error when a figure of a row, or of all rows together, misses beyond bad luck what is held
+// (score_table.hpp). Seeds rotate with HOTCORE_SEED.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -31,7 +32,7 @@ struct Bound {
   bool (*hit)(const CaseResult&);
   bool at_least;
   double promised;
-  double floor;  // what CI holds: what was reached when this was written, with a margin
+  double held;  // the promise; or, where README tells that less is found, what was: there and with --first 2500000
 };
 
 bool right(const CaseResult& r) { return r.outcome() == Outcome::right; }
@@ -66,92 +67,92 @@ const std::vector<Row>& rows() {
        Duty::robot,
        Core::none,
        0,
-       {{"named right", right, true, 0.75, 0.50},
-        {"named wrong", wrong, false, 0.015, 0.05},
-        {"right or tied with the truth", covered, true, 0.85, 0.60}}},
+       {{"named right", right, true, 0.75, 0.74},
+        {"named wrong", wrong, false, 0.015, 0.03},
+        {"right or tied with the truth", covered, true, 0.85, 0.85}}},
       {"duty-sparse",
        "robot duty, housing + sparse winding",
        each_cause,
        Duty::robot,
        Core::sparse,
        0,
-       {{"named right", right, true, 0.85, 0.60},
-        {"named wrong", wrong, false, 0.01, 0.06},
-        {"right or tied with the truth", covered, true, 0.92, 0.70}}},
+       {{"named right", right, true, 0.85, 0.85},
+        {"named wrong", wrong, false, 0.01, 0.01},
+        {"right or tied with the truth", covered, true, 0.92, 0.88}}},
       {"designed-sparse",
        "designed profile, housing + sparse winding",
        each_cause,
        Duty::designed,
        Core::sparse,
        0,
-       {{"named right", right, true, 0.92, 0.75},
-        {"named wrong", wrong, false, 0.01, 0.06},
-        {"right or tied with the truth", covered, true, 0.97, 0.80}}},
+       {{"named right", right, true, 0.92, 0.91},
+        {"named wrong", wrong, false, 0.01, 0.01},
+        {"right or tied with the truth", covered, true, 0.97, 0.94}}},
       {"designed-dense",
        "designed profile, housing + dense winding",
        each_cause,
        Duty::designed,
        Core::dense,
        0,
-       {{"named right", right, true, 0.97, 0.80},
-        {"named wrong", wrong, false, 0.005, 0.05},
-        {"right or tied with the truth", covered, true, 0.98, 0.80}}},
+       {{"named right", right, true, 0.97, 0.96},
+        {"named wrong", wrong, false, 0.005, 0.005},
+        {"right or tied with the truth", covered, true, 0.98, 0.97}}},
       {"clean-duty",
        "nothing hidden, robot duty",
        nothing,
        Duty::robot,
        Core::sparse,
        25,
-       {{"alarms", alarm, false, 0.01, 0.05}}},
+       {{"alarms", alarm, false, 0.01, 0.01}}},
       {"clean-designed",
        "nothing hidden, designed profile",
        nothing,
        Duty::designed,
        Core::sparse,
        25,
-       {{"alarms", alarm, false, 0.01, 0.05}}},
+       {{"alarms", alarm, false, 0.01, 0.01}}},
       {"clean-dense",
        "nothing hidden, designed profile, winding read all the time",
        nothing,
        Duty::designed,
        Core::dense,
        5,
-       {{"alarms", alarm, false, 0.01, 0.05}}},
+       {{"alarms", alarm, false, 0.01, 0.01}}},
       {"outside-duty",
        "effects that the table does not know, robot duty",
        outside,
        Duty::robot,
        Core::sparse,
        0,
-       {{"called unknown", unknown, true, 0.85, 0.20}, {"named", named, false, 0.05, 0.50}}},
+       {{"called unknown", unknown, true, 0.85, 0.69}, {"outside named", named, false, 0.05, 0.18}}},
       {"outside-designed",
        "effects that the table does not know, designed",
        outside,
        Duty::designed,
        Core::sparse,
        0,
-       {{"called unknown", unknown, true, 0.95, 0.40}, {"named", named, false, 0.01, 0.30}}},
+       {{"called unknown", unknown, true, 0.95, 0.65}, {"outside named", named, false, 0.01, 0.14}}},
       {"pairs-duty",
        "two effects at once, robot duty",
        pairs,
        Duty::robot,
        Core::sparse,
        0,
-       {{"named exactly", right, true, 0.85, 0.25}}},
+       {{"named exactly", right, true, 0.85, 0.65}}},
       {"pairs-designed",
        "two effects at once, designed profile",
        pairs,
        Duty::designed,
        Core::sparse,
        0,
-       {{"named exactly", right, true, 0.93, 0.60}}},
+       {{"named exactly", right, true, 0.93, 0.80}}},
       {"eleven",
        "one effect over eleven small ones, designed",
        Hidden::dominant,
        Duty::designed,
        Core::sparse,
        0,
-       {{"in the set", ::dominant, true, 0.90, 0.65}}},
+       {{"in the set", ::dominant, true, 0.90, 0.85}}},
       // Ours: what must not happen when the truth is not in the table, and when there is none.
       {"removed",
        "the hidden cause taken out of the table, designed",
@@ -159,14 +160,14 @@ const std::vector<Row>& rows() {
        Duty::designed,
        Core::sparse,
        0,
-       {{"another one named", named, false, 0.05, 0.50}}},
+       {{"another one named", named, false, 0.05, 0.19}}},
       {"zero",
        "effects of strength zero, robot duty",
        zero,
        Duty::robot,
        Core::sparse,
        0,
-       {{"alarms", alarm, false, 0.01, 0.05}}},
+       {{"alarms", alarm, false, 0.01, 0.01}}},
   };
   return all;
 }
@@ -248,25 +249,25 @@ void add_measures(const Row& row, const std::vector<CaseResult>& results, Table&
     worse += *r.core_after_K > *r.core_before_K + 0.05;  // K: half a step of the housing sensor
   }
   if (row.hidden == Hidden::removed && far > 0)
-    table.add(row.key, "D > 40 another one named", far_answered, far, false, row.bounds[0].promised, 0.30);
+    table.add(row.key, "D > 40 another one named", far_answered, far, false, row.bounds[0].promised, 0.15);
   if (row.hidden == Hidden::outside && far > 0) {
-    table.add(row.key, "D > 40 called unknown", far_unknown, far, true, row.bounds[0].promised, 0.40);
-    table.add(row.key, "D > 40 named", far_answered, far, false, row.bounds[1].promised, 0.30);
+    table.add(row.key, "D > 40 called unknown", far_unknown, far, true, row.bounds[0].promised, 0.83);
+    table.add(row.key, "D > 40 outside named", far_answered, far, false, row.bounds[1].promised, 0.17);
   }
   if (row.hidden == Hidden::pairs && seen > 0) {
-    table.add(row.key, "D >= 3 named exactly", seen_named, seen, true, row.bounds[0].promised, 0.40);
-    table.add(row.key, "D > 40 named exactly", far_named, far, true, row.bounds[0].promised, 0.40);
+    table.add(row.key, "D >= 3 named exactly", seen_named, seen, true, row.bounds[0].promised, 0.84);
+    table.add(row.key, "D > 40 named exactly", far_named, far, true, row.bounds[0].promised, row.bounds[0].promised);
   }
   if (ratios.empty()) return;
   table.add_median(row.key, "winding unseen: error before/after", ratios, row.duty == Duty::designed ? 5 : 3, 1.0);
-  table.add(row.key, "winding unseen: worse", worse, static_cast<int>(ratios.size()), false, 0.02, 0.30);
-  table.add(row.key, "D > 40 named right", far_named, far, true, 0.93, 0.40);
+  table.add(row.key, "winding unseen: worse", worse, static_cast<int>(ratios.size()), false, 0.02, 0.04);
+  table.add(row.key, "D > 40 named right", far_named, far, true, 0.93, 0.93);
   // What some rival imitates to within the noise cannot be named, and the line on D < 3 forbids to try.
-  table.add(row.key, "D >= 3 named right", seen_named, seen, true, row.bounds[0].promised, 0.40);
-  table.add(row.key, "D >= 3 right or tied", seen_covered, seen, true, row.bounds[2].promised, 0.40);
-  table.add(row.key, "D < 3 named", near_named, near, false, 0.05, 0.40);
-  table.add(row.key, "parameters within 2 std. errors", parameters_right, parameters, true, 0.90, 0.40);
-  if (row.core == Core::sparse) table.add(row.key, "ties that the advice resolves", resolved, ties, true, 0.80, 0.05);
+  table.add(row.key, "D >= 3 named right", seen_named, seen, true, row.bounds[0].promised, row.bounds[0].promised);
+  table.add(row.key, "D >= 3 right or tied", seen_covered, seen, true, row.bounds[2].promised, row.bounds[2].promised);
+  table.add(row.key, "D < 3 named", near_named, near, false, 0.05, 0.15);
+  table.add(row.key, "parameters within 2 std. errors", parameters_right, parameters, true, 0.90, 0.90);
+  if (row.core == Core::sparse) table.add(row.key, "ties that the advice resolves", resolved, ties, true, 0.80, 0.80);
   // Honesty: against the truths of other logs the answers must be worth nothing.
   int by_chance = 0;
   for (std::size_t i = 0; i < results.size(); ++i)
@@ -337,7 +338,7 @@ int score(const Arguments& a) {
     const std::size_t before = table.size();
     for (const Bound& b : row->bounds) {
       table.add(row->key, b.what, static_cast<int>(std::count_if(results.begin(), results.end(), b.hit)),
-                static_cast<int>(results.size()), b.at_least, b.promised, b.floor);
+                static_cast<int>(results.size()), b.at_least, b.promised, b.held);
     }
     add_measures(*row, results, table);
     if (a.json) continue;
@@ -346,14 +347,17 @@ int score(const Arguments& a) {
     std::fflush(stdout);
   }
   std::filesystem::remove(path);
+  const Table pooled = table.pooled();
   if (a.json)
     fmt::print(
         "{}\n",
-        nlohmann::ordered_json{{"first_seed", a.first}, {"structure", a.structure}, {"figures", table.json()}}.dump(2));
+        nlohmann::ordered_json{
+            {"first_seed", a.first}, {"structure", a.structure}, {"figures", table.json()}, {"all_rows", pooled.json()}}
+            .dump(2));
   else
-    fmt::print("{} logs, first seed {}, structure {:g}, {:.2f} s a search\n", all, a.first, a.structure,
-               search_s / static_cast<double>(std::max<std::size_t>(all, 1)));
-  return a.check && !table.holds() ? 1 : 0;
+    fmt::print("{}{} logs, first seed {}, structure {:g}, {:.2f} s a search\n", pooled.text(), all, a.first,
+               a.structure, search_s / static_cast<double>(std::max<std::size_t>(all, 1)));
+  return a.check && !(table.holds() && pooled.holds()) ? 1 : 0;
 }
 
 }  // namespace
@@ -386,7 +390,7 @@ int main(int argc, char** argv) {
   app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")->capture_default_str();
   app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")->capture_default_str();
   app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
-  app.add_flag("--check", a.check, "end with an error below the floors");
+  app.add_flag("--check", a.check, "end with an error where what is held is missed");
   app.add_flag("--verbose", a.verbose, "one line a log");
   app.add_flag("--explain", a.explain, "with --verbose, identify's reasoning");
   app.add_flag("--json", a.json, "the table as JSON");

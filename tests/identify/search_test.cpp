@@ -21,6 +21,7 @@
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "tests/identify/hidden_log.hpp"
+#include "tests/identify/score_table.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "thermal/network.hpp"
 #include "thermal/validate.hpp"
@@ -555,6 +556,21 @@ TEST(ModelFile, TrustIsInWhatTheBoardsHeatDependsOn) {
   EXPECT_NEAR(trust(0.3).correlation, 0.3f, 1e-4);
   EXPECT_NEAR(trust(0, true).power, 0.08f, 1e-5) << "what ended at a bound is not known for that";
   EXPECT_NEAR(trust(0, false, 200).power, 0.16f, 1e-5) << "and more than noise was left";
+}
+
+TEST(Score, WhatARowMayMissByChanceAllRowsTogetherMayNot) {
+  const auto of_four_rows = [](int right, int wrong) {
+    tests::Table table;
+    for (const char* row : {"a", "b", "c", "d"}) {
+      table.add(row, "right", right, 7, true, 0.9, 0.85);
+      table.add(row, "wrong", wrong, 7, false, 0.05, 0.15);
+    }
+    EXPECT_TRUE(table.holds());
+    return table.pooled();
+  };
+  EXPECT_TRUE(of_four_rows(5, 2).holds());
+  EXPECT_FALSE(of_four_rows(4, 2).holds());
+  EXPECT_FALSE(of_four_rows(5, 3).holds());
 }
 
 TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
