@@ -22,7 +22,8 @@ constexpr const char* in_milliseconds =
 bool far_too_slow(const Problem& problem, const Fit& f) {
   const Physical p = physical(f.x);
   const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
-  return std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
+  return !problem.belief.known &&
+         std::all_of(lines.begin(), lines.end(), [](const ParameterLine& line) { return line.determined; }) &&
          p.R1_K_per_W * p.C1_J_per_K > 1e3 && p.R2_K_per_W * p.C2_J_per_K > 1e5;
 }
 
