@@ -224,7 +224,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       out.push_back(std::move(c));
     }
   }
-  if (a.at_most > 0 && out.size() > static_cast<std::size_t>(a.at_most)) {
+  if (a.at_most > 0 && row.hidden != Hidden::nothing && out.size() > static_cast<std::size_t>(a.at_most)) {
     std::mt19937_64 random(a.first);
     for (std::size_t i = out.size() - 1; i > 0; --i) std::swap(out[i], out[random() % (i + 1)]);
     out.resize(static_cast<std::size_t>(a.at_most));
@@ -374,7 +374,7 @@ int main(int argc, char** argv) {
   });
   app.add_flag("--list", list, "the rows");
   app.add_option("--seeds", a.seeds, "logs for each hidden thing")->capture_default_str();
-  app.add_option("--at-most", a.at_most, "logs of a row, drawn by the first seed");
+  app.add_option("--at-most", a.at_most, "logs of a row that hides something, drawn by the first seed");
   app.add_option("--first", a.first, "first seed")->capture_default_str();
   app.add_option("--only", a.only, "one cause");
   app.add_option("--remove", a.remove, "take a cause out of the table");
