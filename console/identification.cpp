@@ -123,6 +123,7 @@ void identify(Console& console, const Arguments& a) {
                   axis, a.minutes, 2.5 * rated_A));
   const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
+  std::filesystem::remove(model);  // of an earlier run
   run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"}, json,
                console.options.json);
 
@@ -143,10 +144,14 @@ void identify(Console& console, const Arguments& a) {
     text += fmt::format("  {:<32} {:>11} -> {}\n", full_name(target), shown(old->second), shown(value));
     changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
   }
-  Json result = {{"sentence", sentence}, {"verdict", answer.value("verdict", std::string())},
-                 {"changes", changes},   {"log", log},
-                 {"model", model},       {"report", a.out + "/report.html"},
-                 {"written", false},     {"saved", false}};
+  Json result = {{"sentence", sentence},
+                 {"verdict", answer.value("verdict", std::string())},
+                 {"changes", changes},
+                 {"log", log},
+                 {"model", std::filesystem::exists(model) ? Json(model) : Json()},
+                 {"report", a.out + "/report.html"},
+                 {"written", false},
+                 {"saved", false}};
   text += fmt::format("Log, model and report: {}\n", a.out);
   result["note"] = offered.note;
   if (offered.values.empty()) {

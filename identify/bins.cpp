@@ -193,21 +193,30 @@ void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const I
   }
 }
 
-double first_reading(const Bins& log, double Bin::*reading, int most, double within_s = 30) {
+double first_reading(const Bins& log, double Bin::*reading, std::size_t from, std::size_t to, int most,
+                     double within_s = 30) {
   double sum = 0;
   int n = 0;
-  for (std::size_t k = 0; k < log.bins.size() && n < most && static_cast<double>(k) * log.width_s < within_s; ++k) {
+  for (std::size_t k = from; k < to && n < most && static_cast<double>(k - from) * log.width_s < within_s; ++k) {
     if (!std::isnan(log.bins[k].*reading)) sum += log.bins[k].*reading, ++n;
   }
   return n > 0 ? sum / n : missing;
 }
 
-void find_start(Bins& out) {
-  out.start_core_degC = first_reading(out, &Bin::core_degC, 1);
-  out.start_housing_degC = first_reading(out, &Bin::housing_degC, 5);
-  // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
-  if (std::isnan(out.start_housing_degC))
-    out.start_housing_degC = first_reading(out, &Bin::housing_degC, 1, out.duration_s());
+void find_starts(Bins& out, const Log& log) {
+  for (const double s : log.resumes_s) {
+    const auto bin = static_cast<std::size_t>(s / out.width_s + 1e-9);
+    if (bin > out.starts.back().bin && bin < out.bins.size()) out.starts.push_back({.bin = bin});
+  }
+  for (std::size_t i = 0; i < out.starts.size(); ++i) {
+    Start& start = out.starts[i];
+    const std::size_t to = i + 1 < out.starts.size() ? out.starts[i + 1].bin : out.bins.size();
+    start.core_degC = first_reading(out, &Bin::core_degC, start.bin, to, 1);
+    start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, 5);
+    // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
+    if (std::isnan(start.housing_degC))
+      start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, 1, out.duration_s());
+  }
 }
 
 void find_idle(Bins& out) {
@@ -283,7 +292,7 @@ Bins bins_of(const Log& log, double finest_s) {
   add_readings(out, log, Role::housing, &Bin::housing_degC, &Bin::housing_at, &Bin::housing_n);
   add_readings(out, log, Role::core, &Bin::core_degC, &Bin::core_at, &Bin::core_n);
   add_ahead(out, log, in);
-  find_start(out);
+  find_starts(out, log);
   find_idle(out);
   return out;
 }
@@ -299,6 +308,13 @@ Bins merged(const Bins& log, std::size_t together) {
   Bins out = log;
   out.width_s = log.width_s * static_cast<double>(together);
   out.bins.clear();
+  for (Start& start : out.starts) start.bin = (start.bin + together - 1) / together;
+  // Of a bin in which the log begins again only what was before.
+  const auto begun_again = [&](std::size_t k) {
+    return std::any_of(log.starts.begin(), log.starts.end(), [&](const Start& start) {
+      return start.bin % together != 0 && k >= start.bin && k / together == start.bin / together;
+    });
+  };
   for (std::size_t first = 0; first < log.bins.size(); first += together) {
     const std::size_t count = std::min(together, log.bins.size() - first);
     const double share = 1 / static_cast<double>(count);
@@ -306,7 +322,7 @@ Bins merged(const Bins& log, std::size_t together) {
     all.idle = true;
     const auto add_reading = [&](const Bin& bin, std::size_t k, double Bin::*value, float Bin::*where,
                                  float Bin::*number) {
-      if (bin.*number == 0) return;
+      if (bin.*number == 0 || begun_again(first + k)) return;
       all.*number += bin.*number;
       const float part = bin.*number / all.*number;
       all.*value += (bin.*value - all.*value) * static_cast<double>(bin.*number) / static_cast<double>(all.*number);
@@ -329,8 +345,9 @@ Bins merged(const Bins& log, std::size_t together) {
       const Bin& bin = log.bins[first + k];
       const double more = bin.input[heater(log)] - all.input[heater(log)];
       const auto at_reading = [&](float where, double own, float n, float of) {
-        return n > 0 ? (ahead + more * log.width_s * static_cast<double>(where) + own) * static_cast<double>(n / of)
-                     : 0;
+        return n > 0 && of > 0
+                   ? (ahead + more * log.width_s * static_cast<double>(where) + own) * static_cast<double>(n / of)
+                   : 0;
       };
       all.housing_ahead += at_reading(bin.housing_at, bin.housing_ahead, bin.housing_n, all.housing_n);
       all.core_ahead += at_reading(bin.core_at, bin.core_ahead, bin.core_n, all.core_n);

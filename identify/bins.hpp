@@ -44,15 +44,21 @@ struct Bin {
   bool idle;  // nothing heats and nothing turns
 };
 
+/// Where a log begins, and where it begins again after a pause in which nothing tells what heated.
+struct Start {
+  std::size_t bin = 0;
+  double housing_degC = missing, core_degC = missing;  // as the first readings say; NaN: none
+};
+
 struct Bins {
   std::string name;
   double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
-  double start_housing_degC = missing, start_core_degC = missing;  // as the first readings say; NaN: none
-  double housing_noise_K = 0, core_noise_K = 0;                    // of one raw reading, from its differences
-  double missing_share = 0, gap_share = 0, housing_step_K = 0;     // as in Log
-  double uneven_per_A2 = 0;                                        // as in Problem
+  std::vector<Start> starts = {Start{}};                        // the first at bin 0
+  double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences
+  double missing_share = 0, gap_share = 0, housing_step_K = 0;  // as in Log
+  double uneven_per_A2 = 0;                                     // as in Problem
   std::vector<std::string> notes;
 
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }

@@ -43,13 +43,15 @@ std::vector<Rung> ladder_of(const Search& found) {
   return out;
 }
 
-/// What stands in a cause's place in the next best sets, and how far behind: all that tie, else the nearest three.
+/// What stands in a cause's place in the next best sets, and how far behind: all that tie, and the nearest three that
+/// are behind by what another log might bring.
 std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
   constexpr std::size_t most = 3;
+  constexpr double near = 100;
   std::vector<Rival> out;
   for (const Candidate& c : found.sets) {
     const auto theirs = ids_of(c.fit.chosen);
-    if (holds(theirs, id) || (!c.tied && out.size() >= most)) continue;
+    if (holds(theirs, id) || (!c.tied && (out.size() >= most || found.chosen.gain - c.gain > near))) continue;
     for (const std::string& other : theirs) {
       const bool known = std::any_of(out.begin(), out.end(), [&](const Rival& r) { return r.id == other; });
       if (!known && !holds(found.tied.front(), other)) out.push_back({other, found.chosen.gain - c.gain});
@@ -154,15 +156,20 @@ std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
 
 /// A room whose temperature was typed in, and warms, looks like a mass, a drift or another cooling.
 void note_typed_ambient(const std::vector<Log>& logs, Report& report) {
-  for (const Log& log : logs) {
-    const auto& room = log.of(Role::ambient);
-    const bool stands = std::all_of(room.begin(), room.end(), [&](double x) { return x == room.front(); });
-    if (log.has(Role::ambient) && !log.has(Role::coolant) && stands)
-      report.notes.push_back(fmt::format(
-          "{}: ambient_degC never moves; a room that warms unmeasured looks like a third mass, a drift or a change of "
-          "cooling.",
-          log.name));
-  }
+  const auto moves = [](const Log& log) {
+    const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
+    double low = 1e300, high = -1e300;
+    for (const double x : sink) {
+      if (!std::isnan(x)) low = std::min(low, x), high = std::max(high, x);
+    }
+    return high > low;
+  };
+  const bool recorded = std::any_of(logs.begin(), logs.end(),
+                                    [](const Log& log) { return log.has(Role::ambient) || log.has(Role::coolant); });
+  if (recorded && std::none_of(logs.begin(), logs.end(), moves))
+    report.notes.push_back(
+        "The recorded ambient never moves; a room that warms unmeasured looks like a third mass, a drift or a "
+        "change of cooling.");
 }
 
 /// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
@@ -341,7 +348,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.sentence = sentence(found, report);
   }
   if (unseen) {
-    report.held_out = score_held_out(*unseen, held, two, nearest ? *nearest : found.chosen.fit, report);
+    report.held_out = score_held_out(*unseen, problem, held, two, nearest ? *nearest : found.chosen.fit, report);
     if (nearest) report.held_out->nearest = ids_of(nearest->chosen);
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }

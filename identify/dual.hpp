@@ -26,6 +26,12 @@ struct Dual {
     return x;
   }
   double slope(int direction) const { return d[direction / 2][direction % 2]; }
+  /// No longer depends on what `other` depends on.
+  void forget(const Dual& other) {
+    for (int i = 0; i < 2 * pairs; ++i) {
+      if (other.slope(i) != 0) d[i / 2][i % 2] = 0;
+    }
+  }
 
   Dual& operator+=(const Dual& b) {
     v += b.v;

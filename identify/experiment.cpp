@@ -82,8 +82,7 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
   double sink = 0;
   for (const Bin& bin : like.bins) sink += bin.input.boundary_degC[0] / static_cast<double>(like.bins.size());
   double since_core_s = 0;
-  out.start_housing_degC = out.has_housing ? sink : missing;
-  out.start_core_degC = out.has_core ? sink : missing;
+  out.starts = {{0, out.has_housing ? sink : missing, out.has_core ? sink : missing}};
   for (const ProfileStep& step : steps) {
     for (double t = 0; t < step.seconds; t += out.width_s) {
       Bin bin{};
@@ -111,7 +110,7 @@ Fit resting(const Problem& trial, const Fit& truth) {
   Fit at_rest = truth;
   const double sink = log.bins.front().input.boundary_degC[0];
   const Eigen::Index shared = base_count + truth.cause_coordinates();
-  at_rest.x.conservativeResize(shared + per_log_count);
+  at_rest.x.conservativeResize(shared + per_start_count);
   at_rest.x[shared] = sink;
   at_rest.x[shared + 1] = 0;
   return at_rest;

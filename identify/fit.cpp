@@ -11,13 +11,16 @@ namespace identify {
 namespace {
 
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
-// A housing that is warm when the log begins may hold a winding that is as much warmer again: R1 over R2 of catalogues,
-// 0.03 to 1.4.
+// Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
+// catalogues is 0.03 to 1.4.
 constexpr double warm_excess_share = 0.5;
 
 struct Coordinate {
   double start, prior, sd, low, high;
 };
+
+/// Initial coordinates of a log.
+Eigen::Index own_count(const Bins& log) { return per_start_count * static_cast<Eigen::Index>(log.starts.size()); }
 
 int coordinates_of(const std::vector<Chosen>& chosen) {
   int n = 0;
@@ -43,15 +46,17 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
     }
   }
   for (const Bins& log : problem.logs) {
-    const double core = log.start_core_degC, housing = log.start_housing_degC;
-    const double at = std::isnan(housing) ? core : housing;
-    const double sink = log.bins.front().input.boundary_degC[0];
-    const double known = std::isnan(at) ? sink : at;
-    out.push_back({known, known, initial_sd_K, known - 60, known + 60});
-    const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
-    const double excess_sd_K =
-        std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
-    out.push_back({excess, excess, initial_sd_K + excess_sd_K, -60, 150});
+    for (const Start& start : log.starts) {
+      const double core = start.core_degC, housing = start.housing_degC;
+      const double at = std::isnan(housing) ? core : housing;
+      const double sink = log.bins[std::min(start.bin, log.bins.size() - 1)].input.boundary_degC[0];
+      const double known = std::isnan(at) ? sink : at;
+      out.push_back({known, known, initial_sd_K, known - 60, known + 60});
+      const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
+      const double excess_sd_K =
+          std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
+      out.push_back({excess, excess, initial_sd_K + excess_sd_K, -60, 150});
+    }
   }
   return out;
 }
@@ -146,43 +151,64 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
   const auto effects = static_cast<Eigen::Index>(averaged.effects.size());
   Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, effects);
   Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(effects);
+  int own = shared;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
-    const int own = shared + per_log_count * static_cast<int>(l);
     Dual<N> local[N];
     for (int i = 0; i < shared; ++i) local[i] = Dual<N>::variable(x[i], i);
-    const auto housing0 = Dual<N>::variable(x[own], shared), excess = Dual<N>::variable(x[own + 1], shared + 1);
+    // All starts of a log share two directions, for no reading depends on more than the last of them.
+    std::vector<Initial<Dual<N>>> initial;
+    for (std::size_t s = 0; s < log.starts.size(); ++s) {
+      const int at = own + per_start_count * static_cast<int>(s);
+      const auto housing0 = Dual<N>::variable(x[at], shared), excess = Dual<N>::variable(x[at + 1], shared + 1);
+      initial.push_back({housing0 + excess, housing0});
+    }
     const auto model = build<Dual<N>>(problem, chosen, local, static_cast<int>(l));
     Sums<N> sums;
+    const auto take_sums = [&] {
+      const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
+      for (int i = 0; i < shared + per_start_count; ++i) {
+        out.gradient[place(i)] += sums.H[i].v;
+        for (int j = 0; j <= i; ++j) {
+          out.information(place(i), place(j)) += sums.H[i].slope(j);
+          if (i != j) out.information(place(j), place(i)) += sums.H[i].slope(j);
+        }
+        for (Eigen::Index e = 0; e < effects; ++e) with_averaged(place(i), e) += sums.with_averaged[e].slope(i);
+      }
+      for (Eigen::Index e = 0; e < effects; ++e) residual_with_averaged[e] += sums.with_averaged[e].v;
+      out.misfit += sums.misfit;
+      out.readings += sums.readings;
+      sums = {};
+      own += per_start_count;
+    };
+    std::size_t begun = 1;
     Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
     Predicted<N> of_housing, of_core;
     bool finite = true;
     // A further node brings two coordinates.
     constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
-    replay<most_nodes>(model, log, housing0 + excess, housing0,
-                       [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
-                         const Bin& bin = log.bins[k];
-                         finite = finite && std::abs(y2.v) < 1e5 && std::abs(y1.v) < 1e5;
-                         add<N>(sums, housing, of_housing, y2, bin.housing_degC, static_cast<double>(bin.housing_n),
-                                averaged, &Leeway::housing_K, l, k);
-                         if (log.has_core)
-                           add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n), averaged,
-                                  &Leeway::core_K, l, k);
-                       });
-    if (!finite || !std::isfinite(sums.misfit)) return false;
-    out.misfit += sums.misfit;
-    out.readings += sums.readings;
-    const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
-    for (int i = 0; i < shared + per_log_count; ++i) {
-      out.gradient[place(i)] += sums.H[i].v;
-      for (int j = 0; j <= i; ++j) {
-        out.information(place(i), place(j)) += sums.H[i].slope(j);
-        if (i != j) out.information(place(j), place(i)) += sums.H[i].slope(j);
+    replay<most_nodes>(model, log, initial, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
+      const Bin& bin = log.bins[k];
+      if (begun < log.starts.size() && k == log.starts[begun].bin) {
+        take_sums();
+        for (Predicted<N>* p : {&of_housing, &of_core}) {
+          p->wander.forget(initial[begun].core_degC);
+          p->disturbance.forget(initial[begun].core_degC);
+        }
+        ++begun;
       }
-      for (Eigen::Index e = 0; e < effects; ++e) with_averaged(place(i), e) += sums.with_averaged[e].slope(i);
-    }
-    for (Eigen::Index e = 0; e < effects; ++e) residual_with_averaged[e] += sums.with_averaged[e].v;
+      finite = finite && std::abs(y2.v) < 1e5 && std::abs(y1.v) < 1e5;
+      add<N>(sums, housing, of_housing, y2, bin.housing_degC, static_cast<double>(bin.housing_n), averaged,
+             &Leeway::housing_K, l, k);
+      if (log.has_core)
+        add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n), averaged, &Leeway::core_K, l,
+               k);
+    });
+    if (!finite || !std::isfinite(sums.misfit)) return false;
+    take_sums();
+    own += per_start_count * static_cast<int>(log.starts.size() - begun);  // of a log that was cut, those after
   }
+  if (!std::isfinite(out.misfit)) return false;
   const Eigen::VectorXd explained = averaged.inverse * residual_with_averaged;
   out.misfit -= 0.5 * residual_with_averaged.dot(explained);
   out.gradient -= with_averaged * explained;
@@ -193,7 +219,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
 
 bool evaluate_any(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
                   const Eigen::VectorXd& x, Evaluation& out) {
-  const int n = base_count + coordinates_of(chosen) + per_log_count;
+  const int n = base_count + coordinates_of(chosen) + per_start_count;
   if (n <= 6) return evaluate<6>(problem, averaged, chosen, x, out);
   if (n <= 8) return evaluate<8>(problem, averaged, chosen, x, out);
   return evaluate<10>(problem, averaged, chosen, x, out);  // two causes have four parameters at most
@@ -358,7 +384,17 @@ double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s
 
 /// Where a log's own coordinates stand.
 Eigen::Index initial_of(const Problem& problem, const Fit& f, int log) {
-  return f.x.size() - per_log_count * (static_cast<Eigen::Index>(problem.logs.size()) - log);
+  Eigen::Index at = f.x.size();
+  for (std::size_t l = problem.logs.size(); l-- > static_cast<std::size_t>(log);) at -= own_count(problem.logs[l]);
+  return at;
+}
+
+std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, int log) {
+  std::vector<Initial<double>> out;
+  Eigen::Index at = initial_of(problem, f, log);
+  for (std::size_t s = 0; s < problem.logs[static_cast<std::size_t>(log)].starts.size(); ++s, at += per_start_count)
+    out.push_back({f.x[at] + f.x[at + 1], f.x[at]});
+  return out;
 }
 
 }  // namespace
@@ -385,7 +421,8 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
   if (warm.size() > 0) {
     const Fit& from = **warm.begin();
-    const auto initial = per_log_count * static_cast<Eigen::Index>(problem.logs.size());
+    Eigen::Index initial = 0;
+    for (const Bins& log : problem.logs) initial += own_count(log);
     x.head(base_count) = from.x.head(base_count);
     x.tail(initial) = from.x.tail(initial);
   }
@@ -490,6 +527,20 @@ Fit transferred(const Problem& other, const Fit& from) {
   return out;
 }
 
+Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f) {
+  const auto c = layout(whole, f.chosen);
+  Fit out = f;
+  out.x.resize(static_cast<Eigen::Index>(c.size()));
+  for (Eigen::Index i = 0; i < out.x.size(); ++i) out.x[i] = c[static_cast<std::size_t>(i)].start;
+  const Eigen::Index shared = base_count + f.cause_coordinates();
+  out.x.head(shared) = f.x.head(shared);
+  for (int l = 0; l < static_cast<int>(whole.logs.size()); ++l) {
+    const Eigen::Index known = own_count(fitted.logs[static_cast<std::size_t>(l)]);
+    out.x.segment(initial_of(whole, out, l), known) = f.x.segment(initial_of(fitted, f, l), known);
+  }
+  return out;
+}
+
 Physical physical(const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
 
 double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate) {
@@ -505,13 +556,12 @@ Model<double> model_of(const Problem& problem, const Fit& f, int log) {
 
 Replayed replayed(const Problem& problem, const Fit& f, int l) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
-  const Eigen::Index own = initial_of(problem, f, l);
   const auto model = model_of(problem, f, l);
   Replayed out;
   Whitener white =
       log.has_housing ? Whitener::housing(problem.noise, log.width_s) : Whitener::core(problem.noise, log.width_s);
   double wander = 0, disturbance = 0;
-  replay<4>(model, log, f.x[own] + f.x[own + 1], f.x[own], [&](std::size_t k, double y2, double y1) {
+  replay<4>(model, log, initial_states(problem, f, l), [&](std::size_t k, double y2, double y1) {
     const Bin& bin = log.bins[k];
     out.housing_degC.push_back(y2);
     out.core_degC.push_back(y1);
@@ -537,14 +587,13 @@ double hottest_degC(const Problem& problem, const Fit& f, int l) {
   const Bins& log = problem.logs[static_cast<std::size_t>(l)];
   auto part = model_of(problem, f, l);
   const int hot = part.hot_node;
-  const Eigen::Index initial = initial_of(problem, f, l);
+  const auto initial = initial_states(problem, f, l);
   double hottest = -1e300;
   part.hot_node = -1;  // a reading is then of one node, not of both
   for (const int node : {part.core, hot}) {
     if (node < 0) continue;
     part.core = node;
-    replay<4>(part, log, f.x[initial] + f.x[initial + 1], f.x[initial],
-              [&](std::size_t, double, double degC) { hottest = std::max(hottest, degC); });
+    replay<4>(part, log, initial, [&](std::size_t, double, double degC) { hottest = std::max(hottest, degC); });
   }
   return hottest;
 }

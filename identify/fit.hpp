@@ -2,8 +2,8 @@
 // Fits the two-resistor model, with any causes added, to all logs of a problem at once.
 //
 // Levenberg-Marquardt on whitened residuals with exact sensitivities (dual.hpp), box bounds and weak priors.
-// Coordinates: ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log
-// the housing's initial temperature and the winding's excess over it.
+// Coordinates: ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log,
+// and again after each pause, the housing's initial temperature and the winding's excess over it.
 #pragma once
 
 #include <Eigen/Dense>
@@ -13,7 +13,7 @@
 
 namespace identify {
 
-inline constexpr int base_count = 4, per_log_count = 2;
+inline constexpr int base_count = 4, per_start_count = 2;
 
 struct Fit {
   std::vector<Chosen> chosen;
@@ -52,6 +52,10 @@ double cost_of_noise(const Problem& problem);
 /// The same model on other logs of the motor: base and causes held as in `from`, initial temperatures from the
 /// first readings.
 Fit transferred(const Problem& other, const Fit& from);
+
+/// The same fit on the same logs, longer than it saw them: what begins after a pause there begins as its first readings
+/// say.
+Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f);
 
 /// What a fit simulates for one log: readings at every bin (also where nothing was measured) and the raw residuals.
 struct Replayed {

@@ -18,9 +18,9 @@ constexpr std::size_t least_blocks = 4;  // drawn from fewer, chance looks small
 constexpr int least_draws = 100;         // for the 2.5th of a hundred to be one of them
 constexpr int veto_draws = 400;
 
-/// Sums of squared residuals of one block under both models.
+/// Sums of one block's residuals, and of their squares under both models.
 struct Block {
-  double before2 = 0, after2 = 0;
+  double before2 = 0, after2 = 0, after = 0;
   int readings = 0;
 };
 
@@ -39,6 +39,7 @@ std::vector<Block> blocks_of(const Problem& problem, const Fit& base, const Fit&
         if (std::isnan(before[k])) continue;
         block.before2 += before[k] * before[k];
         block.after2 += after[k] * after[k];
+        block.after += after[k];
         ++block.readings;
       }
       if (block.readings > 0) out.push_back(block);
@@ -90,10 +91,14 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOut& out,
           "{:.2f} K: do not rely on it.",
           what, after_K, before_K);
   }
+  // Of blocks' means: readings may be noisier there than in the fit.
+  double sum2 = 0, readings = 0;
+  for (const Block& b : blocks) sum2 += b.after * b.after / b.readings, readings += b.readings;
+  const double lasting_K = std::sqrt(sum2 / std::max(readings, 1.0));
   constexpr double far = 3, worth_K = 1;
   const double fitted_K = of(report.causes.empty() ? report.baseline_rmse : report.extended_rmse);
   const bool answered = report.verdict != word(Verdict::unknown_cause) && report.verdict != word(Verdict::insufficient);
-  if (answered && !std::isnan(fitted_K) && after_K > std::max(worth_K, far * fitted_K))
+  if (answered && !std::isnan(fitted_K) && lasting_K > std::max(worth_K, far * fitted_K))
     return fmt::format(
         "On what was held out, though, the {} is missed by {:.2f} K, where {:.2f} K were missed in the "
         "fit: something in it is not in what was fitted.",
@@ -123,19 +128,22 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
   return out;
 }
 
-HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& base, const Fit& extended,
-                       Report& report) {
+HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+                       const Fit& extended, Report& report) {
   HeldOut out;
   if (held.fraction > 0) {
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
-    out.before = rmse_of(unseen, base);
-    out.after = rmse_of(unseen, extended);
-    judge(unseen, base, extended, held.draws, report, out);
-    add_plots(unseen, base, " (the last part, not seen by the fit)", report);
-    add_extended(unseen, extended, report, report.plots.size() - unseen.logs.size());
+    const Fit before = carried_on(unseen, fitted, base), after = carried_on(unseen, fitted, extended);
+    out.before = rmse_of(unseen, before);
+    out.after = rmse_of(unseen, after);
+    judge(unseen, before, after, held.draws, report, out);
+    add_plots(unseen, before, " (the last part, not seen by the fit)", report);
+    add_extended(unseen, after, report, report.plots.size() - unseen.logs.size());
     return out;
   }
-  out.how = fmt::format("{}; initial temperatures from its first readings", held.logs.front().name);
+  out.how = fmt::format("{}{}; initial temperatures from {} first readings", held.logs.front().name,
+                        held.logs.size() > 1 ? fmt::format(" and {} more", held.logs.size() - 1) : "",
+                        held.logs.size() > 1 ? "their" : "its");
   // What is of one of the fitted logs (a fan) is not of these.
   Fit elsewhere = extended;
   for (Chosen& c : elsewhere.chosen) c.log = -1;

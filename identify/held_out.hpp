@@ -12,8 +12,8 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
 
 /// Errors of both models on that, with a bootstrap interval over blocks of a minute. Logs that were held out are added
 /// to the report's plots.
-HeldOut score_held_out(const Problem& unseen, const HoldOut& held, const Fit& base, const Fit& extended,
-                       Report& report);
+HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+                       const Fit& extended, Report& report);
 
 /// Why the extended model must not be believed: fitted to the first three quarters of each log it misses the last by
 /// more than the two-resistor model does, and by more than chance explains. Empty: it may.

@@ -255,13 +255,14 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
   return repeated;
 }
 
-/// A time of day that falls by half a day or more has passed midnight.
+/// A time of day that falls by half a day or more has passed midnight; one that rises by nearly a day is a row from
+/// before it, out of order.
 void pass_midnights(Log& log) {
-  constexpr double day_s = 86400;
+  constexpr double day_s = 86400, near_s = 600;
   double before_s = 0;
   int midnights = 0;
   for (double& t : log.of(Role::time)) {
-    midnights += before_s - t > day_s / 2;
+    midnights += (before_s - t > day_s / 2) - (midnights > 0 && t - before_s > day_s - near_s);
     before_s = t;
     t += day_s * midnights;
   }
@@ -284,7 +285,7 @@ std::size_t rows_at_rest(const Log& log) {
   double most = 0;
   for (std::size_t i = 0; i < rows; ++i) most = heat(i) > most ? heat(i) : most;
   std::size_t rest = 0;
-  while (rest < rows && !(heat(rest) > 1e-3 * most)) ++rest;
+  while (rest < rows && heat(rest) <= 1e-3 * most) ++rest;  // what is not told is no rest
   return rest;
 }
 
@@ -315,8 +316,8 @@ void read_resistance(Log& log) {
     soaked = soaked && (!log.has(role) || std::abs(median(at_rest(role)) - start_degC) <= soaked_K);
   if (!soaked) {
     log.notes.push_back(
-        "winding_ohm is not used, since its temperature is known at no moment: begin the log at rest with a reading of "
-        "it and all at room temperature, or convert it to core_degC yourself.");
+        "winding_ohm is not used, since its temperature is known at no moment: begin the log at rest, all at room "
+        "temperature, with readings of it, the housing and the room, or convert it to core_degC yourself.");
     return;
   }
   log.of(Role::core) = std::move(ohm);

@@ -71,9 +71,10 @@ struct Log {
   std::string name;
   std::array<std::vector<double>, role_count> columns;
   std::vector<std::string> notes;  // what was repaired, masked or assumed, one sentence each
-  double missing_share = 0;   // of housing (else core) readings, of input cells or of whole rows: the worst of these
-  double gap_share = 0;       // of the duration, what lies in gaps
-  double housing_step_K = 0;  // of a sensor so coarse that only its steps are readings; else 0
+  double missing_share = 0;  // of housing (else core) readings, of input cells or of whole rows: the worst of these
+  double gap_share = 0;      // of the duration, what lies in gaps
+  std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
+  double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
   std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }

@@ -107,6 +107,7 @@ void read_between_steps(Log& log, Role role) {
   for (std::size_t i = 1; i < v.size(); ++i) {
     const double moved_K = std::abs(settled[i] - settled[i - 1]);
     if (std::isnan(moved_K) || moved_K == 0) continue;
+    if (t[i] - t[i - 1] > apart_s) continue;  // when in a gap is not known
     const double degC = (settled[i] + settled[i - 1]) / 2;
     if (steps.empty() || steps.back().degC != degC || t[i] - t[steps.back().last] > flutter_s)
       steps.push_back({i, i, degC});
@@ -132,22 +133,32 @@ void read_between_steps(Log& log, Role role) {
       own_name(role), step_K, unhurried.size(), steps.size()));
 }
 
+/// After a pause in what heats (pauses.hpp).
+bool resumes(const Log& log, double at_s) {
+  return std::find(log.resumes_s.begin(), log.resumes_s.end(), at_s) != log.resumes_s.end();
+}
+
 /// Share of a channel that is missing. One that comes regularly but not in every row, as from a bus whose messages were
 /// written one a row, is judged by its own interval.
 double missing_of_input(const Log& log, Role role) {
   const auto &v = log.of(role), &t = log.of(Role::time);
   std::vector<double> spacing_s;
-  double last_s = missing;
+  double last_s = missing, pauses_s = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (std::isnan(v[i])) continue;
-    if (!std::isnan(last_s)) spacing_s.push_back(t[i] - last_s);
+    if (resumes(log, t[i]))
+      pauses_s += t[i] - last_s;
+    else if (!std::isnan(last_s))
+      spacing_s.push_back(t[i] - last_s);
     last_s = t[i];
   }
   const double grid_s = median(spacing_s);
   const auto late = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) { return s > 1.5 * grid_s; });
   const double of_rows = static_cast<double>(count_missing(v)) / static_cast<double>(v.size());
   if (spacing_s.size() < 10 || 10 * static_cast<std::size_t>(late) > spacing_s.size()) return of_rows;
-  return std::max(0.0, 1 - static_cast<double>(spacing_s.size() + 1) * grid_s / (t.back() - t.front() + grid_s));
+  const double of_time =
+      1 - static_cast<double>(spacing_s.size() + 1) * grid_s / (t.back() - t.front() - pauses_s + grid_s);
+  return std::clamp(of_time, 0.0, of_rows);  // rows that are missing are counted as such
 }
 
 /// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
@@ -189,21 +200,27 @@ void note_gaps(Log& log) {
   std::vector<double> spacing;
   for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
   const double usual = median(spacing);
-  double lost_s = 0;
+  double lost_s = 0, held_s = 0;
   int gaps = 0;
-  for (const double dt : spacing) {
+  for (std::size_t i = 0; i < spacing.size(); ++i) {
+    const double dt = spacing[i];
+    if (resumes(log, t[i + 1])) {
+      lost_s += dt - usual;
+      continue;
+    }
     // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are
     // formed.
-    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) lost_s += dt - usual, ++gaps;
+    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) held_s += dt - usual, ++gaps;
   }
   const double duration = t.back() - t.front();
-  log.gap_share = duration > 0 ? lost_s / duration : 0;
+  log.gap_share = duration > 0 ? held_s / duration : 0;
   if (gaps > 0) {
     log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
-                                    gaps, gaps == 1 ? "" : "s", lost_s, duration, gaps == 1 ? "it" : "them"));
+                                    gaps, gaps == 1 ? "" : "s", held_s, duration, gaps == 1 ? "it" : "them"));
   }
   // Rows that are missing one by one among the others: the current that flowed in them is not known either.
-  const double rows_lost = duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s) / duration : 0;
+  const double rows_lost =
+      duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s + held_s) / duration : 0;
   if (rows_lost > 0.1) {
     log.notes.push_back(
         fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).", 100 * rows_lost, usual));
@@ -215,7 +232,7 @@ void note_gaps(Log& log) {
 
 std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<double>& values) {
   struct Run {
-    std::size_t from, to;
+    std::size_t from, to, readings;
   };
   std::vector<Run> runs;
   std::vector<double> lengths, steps;
@@ -225,15 +242,16 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
     if (std::isnan(x)) continue;
     if (!runs.empty() && x == last) {
       runs.back().to = i + 1;
+      ++runs.back().readings;
       continue;
     }
     if (!runs.empty()) steps.push_back(std::abs(x - last));
-    runs.push_back({i, i + 1});
+    runs.push_back({i, i + 1, 1});
     last = x;
   }
   std::vector<std::pair<std::size_t, std::size_t>> frozen;
   if (runs.size() < 10) return frozen;  // a typed constant, or a recording of nothing: no motion to compare with
-  for (const Run& run : runs) lengths.push_back(static_cast<double>(run.to - run.from));
+  for (const Run& run : runs) lengths.push_back(static_cast<double>(run.readings));
   std::vector<double> sorted = lengths;
   std::sort(sorted.begin(), sorted.end());
   const double usual = sorted[sorted.size() * 9 / 10];
@@ -255,7 +273,8 @@ void forget_glitches(Log& log) {
   constexpr double jump_K = 10;  // and back; beyond any thermistor's noise
   constexpr std::size_t most = 3;
   // Nothing that warms by so much is back within these times: a winding cools in 1 s and more, a housing in minutes.
-  constexpr double winding_s = 2.5, elsewhere_s = 60;
+  // Water and air may change as fast as a winding.
+  constexpr double fast_s = 2.5, housing_s = 60;
   constexpr double back_share = 0.1;  // so near to where it came from
   const auto& t = log.of(Role::time);
   const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
@@ -267,16 +286,21 @@ void forget_glitches(Log& log) {
       if (!std::isnan(v[i])) read.push_back(i);
     }
     const bool motor = role == Role::core || role == Role::housing;
-    const double within_s = role == Role::core ? winding_s : elsewhere_s;
+    std::vector<double> early;
+    for (std::size_t k = 0; k < std::min<std::size_t>(5, read.size()); ++k) early.push_back(v[read[k]]);
+    const double first_degC = median(early);
+    const double within_s = role == Role::housing ? housing_s : fast_s;
     /// Readings k to m-1, away from number `from`, with number `to` as near to it as before?
     const auto glitch = [&](std::size_t k, std::size_t m, std::size_t from, std::size_t to) {
       const std::size_t first = std::min({read[k], read[from], read[to]}), last = std::max(read[m - 1], read[to]);
       double away_K = 1e300;
-      bool colder = motor && !sink.empty();  // than all around, which no load makes a motor
+      // Than all around and than itself at first, before and after, which no load makes a motor.
+      const auto cold = [&](std::size_t i) { return v[read[i]] < std::min(sink[read[i]], first_degC) - jump_K; };
+      bool colder = motor && !sink.empty() && !cold(from) && !cold(to);
       for (std::size_t i = k; i < m; ++i) {
         const double change_K = v[read[i]] - v[read[from]];
         away_K = std::min(away_K, std::abs(change_K));
-        colder = colder && change_K < 0 && v[read[i]] < sink[read[i]] - jump_K;
+        colder = colder && change_K < 0 && cold(i);
       }
       if (away_K < jump_K) return false;
       if (colder && v[read[to]] > v[read[k]] + jump_K) return true;
@@ -306,25 +330,27 @@ void forget_glitches(Log& log) {
                       own_name(role), glitches.size(), glitches.size() == 1 ? "" : "s", t[glitches.front()]));
   }
 
-  constexpr double many_times = 3;
+  // An overload of one row is a load, and comes again; a hundred times the heat of what ever lasts for two is none.
+  constexpr double many_times = 10, most_share = 0.01;
   for (const Role role : {Role::current, Role::id, Role::iq, Role::power}) {
     std::vector<double>& v = log.of(role);
-    double lasting = 0;  // the most that two rows in a row hold
-    for (std::size_t i = 1; i < v.size(); ++i) {
-      const double both = std::min(std::abs(v[i]), std::abs(v[i - 1]));
-      if (!std::isnan(both)) lasting = std::max(lasting, both);
+    const double times = role == Role::power ? many_times * many_times : many_times;
+    double lasting = 0, before = missing;
+    std::size_t told = 0;
+    for (const double x : v) {
+      if (std::isnan(x)) continue;
+      if (told++ > 0) lasting = std::max(lasting, std::min(std::abs(x), std::abs(before)));
+      before = x;
     }
-    std::size_t glitches = 0, first = 0;
+    std::vector<std::size_t> glitches;
     for (std::size_t i = 0; i < v.size(); ++i) {
-      if (!(lasting > 0) || !(std::abs(v[i]) > many_times * lasting)) continue;
-      if (glitches++ == 0) first = i;
-      v[i] = missing;
+      if (lasting > 0 && std::abs(v[i]) > times * lasting) glitches.push_back(i);
     }
-    if (glitches > 0)
-      log.notes.push_back(
-          fmt::format("{} exceeds {:g} times what it ever holds for two rows, in {} single row{}; masked, the first at "
-                      "{:.1f} s.",
-                      own_name(role), many_times, glitches, glitches == 1 ? "" : "s", t[first]));
+    if (glitches.empty() || static_cast<double>(glitches.size()) > most_share * static_cast<double>(told)) continue;
+    for (const std::size_t i : glitches) v[i] = missing;
+    log.notes.push_back(fmt::format(
+        "{} exceeds {:g} times what it ever holds for two rows, in {} single row{}; masked, the first at {:.1f} s.",
+        own_name(role), times, glitches.size(), glitches.size() == 1 ? "" : "s", t[glitches.front()]));
   }
 }
 

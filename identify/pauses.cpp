@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "identify/masks.hpp"
 #include "identify/median.hpp"
@@ -13,10 +12,13 @@
 namespace identify {
 namespace {
 
-// Held over five seconds, a wrong current moves a small motor's winding (1 to 20 s) by kelvins.
-constexpr double pause_s = 5, pause_rows = 5;
-constexpr std::size_t most_parts = 8;   // each part costs two initial temperatures, and a fit of what is of one log
-constexpr std::size_t least_rows = 30;  // as bins.cpp asks of a log
+// Held over five seconds, a wrong current moves a small motor's winding (1 to 20 s) by kelvins. After ten minutes a
+// housing and what it is mounted on have moved as well.
+constexpr double pause_s = 5, long_s = 600, pause_rows = 5;
+constexpr std::size_t most_pauses = 24;  // each costs two initial temperatures
+constexpr double most_share = 0.02;      // of the rows: more are a logger that writes now and then
+// Of a part, so that also what is held out of it leaves enough to be fitted.
+constexpr std::ptrdiff_t least_rows = 100, least_readings = 40;
 
 Role heat_of(const Log& log) {
   for (const Role role : {Role::power, Role::current}) {
@@ -25,48 +27,62 @@ Role heat_of(const Log& log) {
   return Role::iq;
 }
 
-/// A measured current goes up and down from row to row; a commanded one, which may well stand still, does not.
-bool is_noisy(const std::vector<double>& v) {
-  double last = missing, before = missing;
-  int moves = 0, turns = 0;
+/// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps, or
+/// goes one way; a coarse one repeats itself.
+bool is_noisy(const std::vector<double>& v, double range) {
+  double last = missing, change = 0;
+  int rows = 0, turns = 0;
   for (const double x : v) {
-    if (std::isnan(x) || x == last) continue;
-    if (!std::isnan(before)) {
-      ++moves;
-      turns += (x > last) != (last > before);
+    if (std::isnan(x)) continue;
+    if (std::abs(x) > 0.1 * range) {
+      ++rows;
+      turns += change * (x - last) < 0 && std::abs(x - last) < 0.1 * range;
     }
-    before = last;
+    change = std::isnan(last) ? 0 : x - last;
     last = x;
   }
-  return moves > 0 && turns > 0.4 * moves;  // of white noise two thirds turn
+  return turns > 0.4 * rows;  // of white noise two thirds turn
 }
 
-/// Forgets a heat input that stands still, not at zero, for longer than a pause.
+/// Forgets a heat input that stands still under load although its noise shows elsewhere.
 void forget_frozen_input(Log& log) {
+  constexpr double least_s = 30;
   const Role role = heat_of(log);
   std::vector<double>& v = log.of(role);
   const auto& t = log.of(Role::time);
-  if (!is_noisy(v)) return;
+  double range = 0;
+  for (const double x : v) range = std::abs(x) > range ? std::abs(x) : range;
+  if (!is_noisy(v, range)) return;
   for (const auto& [from, to] : frozen_runs(v)) {
     const double stood_s = t[to - 1] - t[from];
-    if (v[from] == 0 || stood_s < 2 * pause_s) continue;
+    if (std::abs(v[from]) < 0.1 * range || stood_s < least_s) continue;
     log.notes.push_back(fmt::format("{} stood frozen at {:.4g} for {:.0f} s from {:.0f} s; what flowed is not known.",
                                     own_name(role), v[from], stood_s, t[from]));
     std::fill(v.begin() + static_cast<std::ptrdiff_t>(from) + 1, v.begin() + static_cast<std::ptrdiff_t>(to), missing);
   }
 }
 
+/// Rows from .. to, time from 0; of surroundings that are told now and then, what was last told.
 Log part_of(const Log& log, std::size_t from, std::size_t to) {
   Log part;
-  part.name = fmt::format("{} (from {:.0f} s)", log.name, log.of(Role::time)[from]);
+  const auto& t = log.of(Role::time);
+  part.name = from == 0 ? fmt::format("{} (to {:.0f} s)", log.name, t[to - 1])
+                        : fmt::format("{} (from {:.0f} s)", log.name, t[from]);
   for (std::size_t c = 0; c < role_count; ++c) {
     const auto& all = log.columns[c];
     if (all.empty()) continue;
     auto& some = part.columns[c];
     some.assign(all.begin() + static_cast<std::ptrdiff_t>(from), all.begin() + static_cast<std::ptrdiff_t>(to));
+    const auto role = static_cast<Role>(c);
+    if (role == Role::ambient || role == Role::coolant || role == Role::frame || role == Role::neighbour) {
+      for (std::size_t i = from; std::isnan(some.front()) && i-- > 0;) some.front() = all[i];
+    }
     if (std::all_of(some.begin(), some.end(), [](double x) { return std::isnan(x); })) some.clear();
   }
-  for (double& t : part.of(Role::time)) t -= log.of(Role::time)[from];
+  for (double& time : part.of(Role::time)) time -= t[from];
+  for (const double s : log.resumes_s) {
+    if (s > t[from] && s <= t[to - 1]) part.resumes_s.push_back(s - t[from]);
+  }
   return part;
 }
 
@@ -80,65 +96,96 @@ void settle_sink(Log& log) {
       fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
 }
 
+/// Where a pause ends, among the rows that tell the heat: those that come after far longer than both their neighbours.
+std::vector<std::size_t> ends_of_pauses(const std::vector<double>& told_s) {
+  std::vector<double> spacing_s;
+  for (std::size_t k = 1; k < told_s.size(); ++k) spacing_s.push_back(told_s[k] - told_s[k - 1]);
+  const double usual_s = median(spacing_s);
+  std::vector<std::size_t> ends;
+  for (std::size_t k = 0; k < spacing_s.size(); ++k) {
+    const double before_s = k > 0 ? spacing_s[k - 1] : 0, after_s = k + 1 < spacing_s.size() ? spacing_s[k + 1] : 0;
+    if (spacing_s[k] > std::max(pause_s, pause_rows * std::max({usual_s, before_s, after_s}))) ends.push_back(k + 1);
+  }
+  if (static_cast<double>(ends.size()) > std::max(1.0, most_share * static_cast<double>(told_s.size()))) return {};
+  std::stable_sort(ends.begin(), ends.end(),
+                   [&](std::size_t a, std::size_t b) { return spacing_s[a - 1] > spacing_s[b - 1]; });
+  ends.resize(std::min(ends.size(), most_pauses));
+  std::sort(ends.begin(), ends.end());
+  return ends;
+}
+
+/// Takes out the rows that tell no heat and lie in a pause, or before the first or after the last that does.
+void take_out_pauses(Log& log) {
+  const auto& heat = log.of(heat_of(log));
+  std::vector<std::size_t> told;
+  std::vector<double> told_s;
+  for (std::size_t i = 0; i < heat.size(); ++i) {
+    if (!std::isnan(heat[i])) told.push_back(i), told_s.push_back(log.of(Role::time)[i]);
+  }
+  if (told.size() < 2) return;
+  std::vector<bool> keep(heat.size(), true);
+  const auto drop = [&](std::size_t from, std::size_t to) {
+    std::fill(keep.begin() + static_cast<std::ptrdiff_t>(from), keep.begin() + static_cast<std::ptrdiff_t>(to), false);
+  };
+  std::string pauses;
+  const auto say = [&](double from_s, double to_s) {
+    pauses += fmt::format("{}{:.0f} s from {:.0f} s", pauses.empty() ? "" : ", ", to_s - from_s, from_s);
+  };
+  const double begin_s = log.of(Role::time).front(), end_s = log.of(Role::time).back();
+  if (told_s.front() - begin_s > pause_s) drop(0, told.front()), say(begin_s, told_s.front());
+  for (const std::size_t k : ends_of_pauses(told_s)) {
+    drop(told[k - 1] + 1, told[k]);
+    say(told_s[k - 1], told_s[k]);
+    log.resumes_s.push_back(told_s[k]);
+  }
+  if (end_s - told_s.back() > pause_s) drop(told.back() + 1, heat.size()), say(told_s.back(), end_s);
+  if (pauses.empty()) return;
+  for (std::vector<double>& column : log.columns) {
+    std::size_t row = 0;
+    std::erase_if(column, [&](double) { return !keep[row++]; });
+    if (std::all_of(column.begin(), column.end(), [](double x) { return std::isnan(x); })) column.clear();
+  }
+  const double first_s = log.of(Role::time).front();
+  for (double& t : log.of(Role::time)) t -= first_s;
+  for (double& t : log.resumes_s) t -= first_s;
+  log.notes.push_back(
+      fmt::format("Nothing tells the heat input for {}; the motor goes on as warm as its next readings say.", pauses));
+}
+
 }  // namespace
 
 std::vector<Log> parts_between_pauses(Log log) {
   forget_frozen_input(log);
+  take_out_pauses(log);
   const auto& t = log.of(Role::time);
-  const auto& heat = log.of(heat_of(log));
-  std::vector<std::size_t> told;  // rows that tell the heat input
-  std::vector<double> spacing_s;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    if (std::isnan(heat[i])) continue;
-    if (!told.empty()) spacing_s.push_back(t[i] - t[told.back()]);
-    told.push_back(i);
+  std::vector<std::size_t> ends;  // rows
+  for (const double s : log.resumes_s) {
+    const auto row = static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), s) - t.begin());
+    if (t[row] - t[row - 1] > long_s) ends.push_back(row);
   }
-  if (spacing_s.empty()) return {std::move(log)};
-  const double usual_s = std::max(pause_s, pause_rows * median(spacing_s));
-  // Of more pauses than that the short ones are bridged.
-  std::vector<std::size_t> longest(spacing_s.size());
-  std::iota(longest.begin(), longest.end(), std::size_t{0});
-  std::stable_sort(longest.begin(), longest.end(),
-                   [&](std::size_t a, std::size_t b) { return spacing_s[a] > spacing_s[b]; });
-  longest.resize(std::min(longest.size(), most_parts - 1));
-  std::erase_if(longest, [&](std::size_t k) { return spacing_s[k] <= usual_s; });
-  std::sort(longest.begin(), longest.end());
-
-  struct Rows {
-    std::size_t from, to;
-  };
-  std::vector<Rows> between = {{t[told.front()] > usual_s ? told.front() : 0, 0}};
-  std::string pauses;
-  const auto pause = [&](std::size_t before, double seconds) {
-    pauses += fmt::format("{}{:.0f} s from {:.0f} s", pauses.empty() ? "" : ", ", seconds, t[before]);
-  };
-  if (between.front().from > 0) pause(0, t[told.front()]);
-  for (const std::size_t k : longest) {
-    between.back().to = told[k] + 1;
-    between.push_back({told[k + 1], 0});
-    pause(told[k], spacing_s[k]);
-  }
-  const double unknown_s = t.back() - t[told.back()];
-  between.back().to = unknown_s > usual_s ? told.back() + 1 : t.size();
-  if (unknown_s > usual_s) pause(told.back(), unknown_s);
-  if (pauses.empty()) return {std::move(log)};
-
-  if (log.has(Role::housing) || log.has(Role::core)) settle_sink(log);
+  if (ends.empty() || (!log.has(Role::housing) && !log.has(Role::core))) return {std::move(log)};
+  settle_sink(log);
+  ends.push_back(t.size());
   std::vector<Log> parts;
   double left_out_s = 0;
-  for (const auto& [from, to] : between) {
+  std::size_t from = 0;
+  for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
-    if (to - from >= least_rows && (part.has(Role::housing) || part.has(Role::core)))
+    const auto read = [&](Role role) {
+      const auto& v = part.of(role);
+      return std::count_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
+    };
+    if (read(Role::time) >= least_rows && std::max(read(Role::housing), read(Role::core)) >= least_readings)
       parts.push_back(std::move(part));
     else
       left_out_s += t[to - 1] - t[from];
+    from = to;
   }
   if (parts.empty()) return {std::move(log)};
   parts.front().notes = log.notes;
-  parts.front().notes.push_back(fmt::format(
-      "Nothing tells the heat input for {}: each part between is taken as a log of its own, as warm as its first "
-      "readings say{}.",
-      pauses, left_out_s > 0 ? fmt::format("; {:.0f} s in parts too short for that are left out", left_out_s) : ""));
+  if (left_out_s > 0)
+    parts.front().notes.push_back(fmt::format(
+        "{:.0f} s between pauses of more than ten minutes are left out: too few rows or readings.", left_out_s));
   return parts;
 }
 

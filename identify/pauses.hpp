@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording that was interrupted: what flowed meanwhile is not known, so what follows is a log of its own.
+// A recording that was interrupted: what flowed meanwhile is not known, so the motor begins anew as warm as it then is.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,9 @@
 
 namespace identify {
 
-/// The parts of a log between its pauses, each with time from 0, or the log itself where there is none. A pause is
-/// where nothing tells the heat input: no rows, empty cells, or a current that is noisy elsewhere and stands still.
+/// Finds pauses: stretches in which nothing tells the heat input, no rows, empty cells, or a current that is noisy
+/// elsewhere and stands still. Takes out what rows they hold and notes in Log::resumes_s where the log goes on; after a
+/// long one the rest is a log of its own, in which also further masses begin anew.
 std::vector<Log> parts_between_pauses(Log log);
 
 }  // namespace identify

@@ -27,18 +27,21 @@ bool far_too_slow(const Problem& problem, const Fit& f) {
          p.R1_K_per_W * p.C1_J_per_K > 1e3 && p.R2_K_per_W * p.C2_J_per_K > 1e5;
 }
 
-/// Nor is a housing that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a sheet that
-/// the data contradicts by all the room there is, a factor of 30, is of another motor.
-std::string unlike_the_motor(const Problem& problem, const Search& found) {
+/// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
+/// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor; what a
+/// housing is mounted on, no sheet knows.
+std::string unlike_the_motor(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+  const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
     const Physical p = physical(f->x);
     const auto lines = base_lines(problem, *f, std::max(1.0, f->ratio()));
-    if (p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && lines[1].determined && lines[3].determined)
+    if (in_air && p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && lines[1].determined && lines[3].determined)
       return "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
              "--column time_s=COLUMN:min.";
   }
   if (!problem.belief.known) return "";
-  for (const ParameterLine& line : base_lines(problem, found.chosen.fit, 1)) {
+  const auto lines = base_lines(problem, found.chosen.fit, 1);
+  for (const ParameterLine& line : {lines[0], lines[2]}) {
     if (line.at_bound)
       return fmt::format(
           "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, or leave --motor away.",
@@ -219,12 +222,13 @@ std::string too_sparse(const Problem& problem, const Search& found, const std::v
       disturbance_of(problem, fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})).noise.disturbance_K;
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
   // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
-  constexpr double times = 3;
-  if (left_K > times * doubt_K) return "";
+  constexpr double times = 2.5, worth_K = 0.02;
+  if (doubt_K < worth_K || left_K > times * doubt_K) return "";
   return fmt::format(
-      "What is left, {:.2f} K, is no more than what the moments leave open at which the load changed "
-      "between rows {:g} s apart or in cells left empty: record the current in every row and more often.",
-      left_K, apart_s);
+      "What no cause explains, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
+      "in cells left empty, and when exactly moves the {} by as much; record the current in every row and "
+      "more often.",
+      left_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding");
 }
 
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
@@ -232,7 +236,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
     if (far_too_slow(problem, *f)) return in_milliseconds;
   }
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found);
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
   Eigen::Index at = base_count;
@@ -259,7 +263,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         "housing_degC are swapped.",
         p.C1_J_per_K / p.C2_J_per_K);
   }
-  return unlike_the_motor(problem, found);
+  return unlike_the_motor(problem, found, logs);
 }
 
 }  // namespace identify

@@ -22,6 +22,12 @@
 
 namespace identify {
 
+/// From where a log is replayed, or replayed again after a pause.
+template <class S>
+struct Initial {
+  S core_degC, housing_degC;
+};
+
 namespace replay_detail {
 
 using thermal::Boundary;
@@ -131,23 +137,36 @@ void correct(const Model<S>& model, const Bins& log, const Splines& splines, std
   }
 }
 
+inline void forget(double&, double) {}
+template <int N>
+void forget(Dual<N>& x, const Dual<N>& what) {
+  x.forget(what);
+}
+
 // Flattened: with every operation of the dual numbers inlined, their pairs stay in registers and the run takes a sixth
 // of the time.
 template <class S, int n, class Visit>
 HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>& network,
                          const thermal::Transition<S, n>& transition, const Bins& log, const Splines& splines,
-                         const S& core_degC, const S& housing_degC, Visit&& visit) {
+                         const std::vector<Initial<S>>& initial, Visit&& visit) {
   using Vector = typename thermal::HeatNetwork<S, n>::Vector;
   const auto& set = model.set;
   const bool corrected = model.offset || model.delayed || model.drifts || model.stalls || model.cooling_changes ||
                          model.uneven_per_A2 != 0;
   thermal::HeatInput<S> in;
-  Vector T = Vector::Constant(housing_degC), next;
-  T[model.core] = core_degC;
-  if (model.hot_node >= 0) T[model.hot_node] = core_degC;
+  Vector T = Vector::Constant(initial.front().housing_degC), next;
   const int housing = set.housing.node;
   const bool lags = value_of(set.housing.lag_s) > 0;
-  S lagged = housing_degC, keep(0), mean_keep(0);
+  S lagged(0), keep(0), mean_keep(0);
+  std::size_t begun = 0;
+  // After a pause a further mass goes on from where it was; that it depends on the earlier start is left out.
+  const auto begin = [&](const Initial<S>& from) {
+    for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.core_degC);
+    T[housing] = lagged = from.housing_degC;
+    T[model.core] = from.core_degC;
+    if (model.hot_node >= 0) T[model.hot_node] = from.core_degC;
+    ++begun;
+  };
   using std::exp;
   if (lags) {
     keep = exp(-log.width_s / set.housing.lag_s);
@@ -163,6 +182,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
 
   for (std::size_t k = 0; k < log.bins.size(); ++k) {
     const Bin& bin = log.bins[k];
+    if (begun < log.starts.size() && k == log.starts[begun].bin) begin(initial[begun]);
     if (corrected) {
       correct(model, log, splines, k, in);
       next = network.step(transition, T, in);
@@ -204,7 +224,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
 
 /// What is done once for a log, not flattened: it would only take longer to compile.
 template <int n, class S, class Visit>
-void prepare_and_run(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC, Visit&& visit) {
+void prepare_and_run(const Model<S>& model, const Bins& log, const std::vector<Initial<S>>& initial, Visit&& visit) {
   const thermal::HeatNetwork<S, n> network(with_cooling_change(model));
   Splines splines;
   if (model.delayed) {
@@ -212,20 +232,20 @@ void prepare_and_run(const Model<S>& model, const Bins& log, const S& core_degC,
     for (int s = 0; s < model.set.source_count; ++s) prepare(model.set.sources[s].drive);
     prepare(Drive::speed_to_0_8);
   }
-  run(model, network, network.transition(log.width_s), log, splines, core_degC, housing_degC, visit);
+  run(model, network, network.transition(log.width_s), log, splines, initial, visit);
 }
 
 }  // namespace replay_detail
 
-/// Replays `log` from core and housing temperatures; `visit(bin, housing reading, core reading)`. `most_nodes`: what
+/// Replays `log` from one state for each of its starts; `visit(bin, housing reading, core reading)`. `most_nodes`: what
 /// the model may have at most, so that no more is compiled than can happen.
 template <int most_nodes, class S, class Visit>
-void replay(const Model<S>& model, const Bins& log, const S& core_degC, const S& housing_degC, Visit&& visit) {
-  if (model.set.node_count == 2) return replay_detail::prepare_and_run<2>(model, log, core_degC, housing_degC, visit);
+void replay(const Model<S>& model, const Bins& log, const std::vector<Initial<S>>& initial, Visit&& visit) {
+  if (model.set.node_count == 2) return replay_detail::prepare_and_run<2>(model, log, initial, visit);
   if constexpr (most_nodes >= 3) {
-    if (model.set.node_count == 3) return replay_detail::prepare_and_run<3>(model, log, core_degC, housing_degC, visit);
+    if (model.set.node_count == 3) return replay_detail::prepare_and_run<3>(model, log, initial, visit);
   }
-  if constexpr (most_nodes >= 4) return replay_detail::prepare_and_run<4>(model, log, core_degC, housing_degC, visit);
+  if constexpr (most_nodes >= 4) return replay_detail::prepare_and_run<4>(model, log, initial, visit);
 }
 
 }  // namespace identify

@@ -114,6 +114,7 @@ TEST(Reader, AClockThatPassesMidnightGoesOn) {
   EXPECT_NEAR(log.of(Role::time)[3], 86403, 1e-9);
   ASSERT_FALSE(log.notes.empty());
   says(log.notes[0], "passes midnight 2 times");
+  says(complaint(head + "23:59:58,1,20\n00:00:00,1,20\n23:59:59,1,20\n00:00:01,1,20\n"), "time runs backwards");
   says(complaint(head + "10:00:00,1,20\n09:00:00,1,20\n"), "time runs backwards");
   says(complaint(head + "86399,1,20\n1,1,20\n"), "time runs backwards");
 }
@@ -502,47 +503,77 @@ TEST(Masks, OneRowOfManyTimesTheCurrentIsAGlitchAndTwoRowsAreNone) {
   EXPECT_EQ(current(2), 99);
 }
 
-TEST(Pauses, WhatFollowsOneIsALogOfItsOwn) {
-  const auto logs = read(recording(400, [](int i, double&, double&) { return i < 100 || i >= 300; }));
-  ASSERT_EQ(logs.size(), 2u);
-  EXPECT_EQ(logs[0].of(Role::time).back(), 99);
-  EXPECT_EQ(logs[1].of(Role::time).front(), 0);
-  EXPECT_EQ(logs[1].of(Role::time).back(), 99);
-  says(logs[1].name, "(from 300 s)");
-  says(logs[0].notes.back(), "Nothing tells the heat input for 201 s from 99 s");
+TEST(Pauses, AfterAShortOneTheLogGoesOnAndAfterALongOneAnotherBegins) {
+  const auto paused = [](int until) {
+    return read(recording(until + 200, [&](int i, double&, double&) { return i < 200 || i >= until; }));
+  };
+  const auto one = paused(300);
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_EQ(one[0].of(Role::time).back(), 499);
+  EXPECT_EQ(one[0].resumes_s, std::vector<double>{300});
+  EXPECT_EQ(one[0].gap_share, 0) << "nothing is held across it";
+  says(one[0].notes.back(), "Nothing tells the heat input for 101 s from 199 s");
+  const auto two = paused(900);
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_EQ(two[0].of(Role::time).back(), 199);
+  EXPECT_EQ(two[1].of(Role::time).front(), 0);
+  EXPECT_EQ(two[1].of(Role::time).back(), 199);
+  says(two[1].name, "(from 900 s)");
   // Both in the same room, though one began warm and no room was recorded.
-  EXPECT_EQ(logs[1].of(Role::ambient), logs[0].of(Role::ambient));
+  EXPECT_EQ(two[1].of(Role::ambient), two[0].of(Role::ambient));
+}
+TEST(Pauses, ARoomThatWasTypedOnceIsThatOfEveryPart) {
+  std::string text = "time_s,current_A,housing_degC,ambient_degC\n";
+  for (int i = 0; i < 1200; ++i) {
+    if (i < 200 || i >= 1000)
+      text += std::to_string(i) + ",2," + std::to_string(20 + 0.03 * i) + (i == 0 ? ",19\n" : ",\n");
+  }
+  const auto logs = read(text);
+  ASSERT_EQ(logs.size(), 2u);
+  EXPECT_EQ(logs[1].of(Role::ambient).front(), 19);
 }
 TEST(Pauses, ACurrentThatIsNotWrittenForAWhileIsOneAlsoAtTheEnd) {
   const auto logs = read(recording(400, [](int i, double& current_A, double&) {
     if ((i >= 100 && i < 200) || i >= 340) current_A = std::nan("");
     return true;
   }));
-  ASSERT_EQ(logs.size(), 2u);
-  EXPECT_EQ(logs[0].of(Role::time).size(), 100u);
-  EXPECT_EQ(logs[1].of(Role::time).size(), 140u);
+  ASSERT_EQ(logs.size(), 1u);
+  EXPECT_EQ(logs[0].resumes_s, std::vector<double>{200});
+  EXPECT_EQ(logs[0].of(Role::time).size(), 240u);
+  EXPECT_EQ(logs[0].missing_share, 0);
 }
-TEST(Pauses, AMeasuredCurrentThatStandsStillIsOneAndACommandedOneIsNone) {
-  const auto stands = [](double noise_A) {
+TEST(Pauses, AMeasuredCurrentThatStandsStillUnderLoadIsOne) {
+  const auto stands = [](const std::function<double(int, double)>& current) {
     return read(recording(400,
                           [&](int i, double& current_A, double&) {
-                            const double ramp_A = 0.01 * std::min(i, 150);
-                            current_A = i >= 200 && i < 300 ? 1.4321 : ramp_A + noise_A * (current_A - 2);
+                            current_A = current(i, current_A - 2);
                             return true;
-                          }))
-        .size();
+                          }))[0]
+        .resumes_s.size();
   };
-  EXPECT_EQ(stands(1), 2u);
-  EXPECT_EQ(stands(0), 1u);
+  const auto held = [](int i) { return i >= 200 && i < 300; };
+  EXPECT_EQ(stands([&](int i, double noise) { return held(i) ? 1.4321 : 2 + noise; }), 1u);
+  EXPECT_EQ(stands([&](int i, double noise) { return held(i) ? 0.02 : 2 + noise; }), 0u) << "an offset at rest";
+  EXPECT_EQ(stands([&](int i, double) { return held(i) ? 1.4321 : 0.01 * i; }), 0u) << "a commanded ramp";
+  EXPECT_EQ(stands([&](int i, double) { return held(i) ? 1.4321 : i % 2 * 3.0; }), 0u) << "commanded pulses";
+  EXPECT_EQ(stands([&](int i, double noise) { return held(i) ? 1.4 : 0.1 * std::round(20 + 3 * noise); }), 0u)
+      << "a coarse current";
+}
+TEST(Pauses, ALoggerThatWritesSeldomAtRestMakesNone) {
+  const auto logs = read(recording(2000, [](int i, double&, double&) { return i / 200 % 4 != 3 || i % 10 == 0; }));
+  ASSERT_EQ(logs.size(), 1u);
+  EXPECT_TRUE(logs[0].resumes_s.empty());
 }
 TEST(Pauses, OfManyTheLongestCount) {
-  const auto logs = read(recording(2000, [](int i, double&, double&) { return i % 100 >= (i < 1000 ? 10 : 20); }));
-  EXPECT_EQ(logs.size(), 8u);
+  const auto logs = read(recording(6000, [](int i, double&, double&) { return i % 200 >= (i < 3000 ? 10 : 20); }));
+  ASSERT_EQ(logs.size(), 1u);
+  EXPECT_EQ(logs[0].resumes_s.size(), 24u);
+  EXPECT_GT(logs[0].resumes_s[23], 5800);
 }
-TEST(Pauses, WhatIsTooShortBetweenThemIsLeftOutAndSaid) {
-  const auto logs = read(recording(400, [](int i, double&, double&) { return i < 150 || i / 10 == 20 || i >= 300; }));
+TEST(Pauses, WhatIsTooShortBetweenLongOnesIsLeftOutAndSaid) {
+  const auto logs = read(recording(2000, [](int i, double&, double&) { return i < 150 || i / 20 == 50 || i >= 1800; }));
   ASSERT_EQ(logs.size(), 2u);
-  says(logs[0].notes.back(), "9 s in parts too short for that are left out");
+  says(logs[0].notes.back(), "19 s between pauses of more than ten minutes are left out");
 }
 
 }  // namespace

@@ -118,7 +118,8 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   held.logs = bench_logs({unseen});
   identify::Report report;
   const auto base = identify::fit(problem, {}), extended = identify::fit(problem, {{cause, 0}});
-  const auto scored = identify::score_held_out(identify::unseen_of(problem, {}, held), held, base, extended, report);
+  const auto scored =
+      identify::score_held_out(identify::unseen_of(problem, {}, held), problem, held, base, extended, report);
   EXPECT_LT(scored.after.core_K, 0.5);
   EXPECT_GT(scored.before.core_K, 2);
 }
