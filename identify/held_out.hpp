@@ -10,8 +10,8 @@ namespace identify {
 /// What `fitted` has not seen of `logs`, or the logs held out.
 Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held);
 
-/// Errors of both models on that, with a bootstrap interval over blocks of a minute. Logs that were held out are added
-/// to the report's plots.
+/// Errors of both models on that, with a bootstrap interval over blocks of a minute. What was held out is added to
+/// the report's plots.
 HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
                        const Fit& extended, Report& report);
 
