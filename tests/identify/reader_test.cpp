@@ -487,7 +487,7 @@ TEST(Masks, AWindingThatIsHotForSecondsIsNoGlitchAndOneColderThanItsRoomIs) {
   for (int i = 0; i < 60; ++i)
     text +=
         std::to_string(i) + ",1," + std::to_string(i == 40 ? 0 : 20 + 60 * std::exp(-std::abs(i - 20) / 3.0)) + ",20\n";
-  const auto& core = read(text)[0].of(Role::core);
+  const auto core = read(text)[0].of(Role::core);
   EXPECT_DOUBLE_EQ(core[20], 80);
   EXPECT_TRUE(std::isnan(core[40]));
 }
