@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identify/filled.hpp"
 #include "identify/masks.hpp"
 #include "identify/median.hpp"
 #include "identify/pauses.hpp"
@@ -473,6 +474,7 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   for (const auto& [key, rows] : sessions) {
     Log whole = one_log(table, found, rows,
                         sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
+    forget_filled(whole);
     forget_glitches(whole);
     check_values(whole, motor);
     for (Log& log : parts_between_pauses(std::move(whole))) {

@@ -68,26 +68,10 @@ std::vector<double> medians_around(const std::vector<double>& v, double usual_s)
   return out;
 }
 
-/// The step of a channel that knows no values in between; 0 where it has none.
-double step_of(const std::vector<double>& v) {
-  std::vector<double> changes;
-  double last = missing;
-  for (const double x : v) {
-    if (std::isnan(x)) continue;
-    if (!std::isnan(last) && x != last) changes.push_back(std::abs(x - last));
-    last = x;
-  }
-  if (changes.empty()) return 0;
-  const double least = *std::min_element(changes.begin(), changes.end());
-  const auto whole = [&](double change) { return std::abs(change / least - std::round(change / least)) < 0.01; };
-  return std::all_of(changes.begin(), changes.end(), whole) ? least : 0;
-}
-
 /// A sensor that tells whole degrees says where it is only as it steps: there the truth lies half way, and in between
 /// it may be anywhere. A flutter about one step is one reading, at its middle. Of steps that follow each other within a
 /// second the moments are not known well enough.
 void read_between_steps(Log& log, Role role) {
-  constexpr double coarse_K = 0.4;  // finer steps are lost in what a thermistor wanders by
   // Of the steps of housings none followed another within a second; of sensors that feel a winding, a tenth and more
   // did (score's motors, whole degrees, seeds 1 to 5).
   constexpr double flutter_s = 2, hurry_s = 1, most_hurried = 0.1;
@@ -229,6 +213,24 @@ void note_gaps(Log& log) {
 }
 
 }  // namespace
+
+double step_of(const std::vector<double>& v) {
+  constexpr double finest = 1e-5;  // what files and single precision leave of a measured value
+  double step = 0, last = missing;
+  for (const double x : v) {
+    if (std::isnan(x)) continue;
+    // The largest number that divides all changes (Euclid).
+    double change = std::isnan(last) ? 0 : std::abs(x - last);
+    while (change > 0.1 * finest) {
+      const double rest = std::fmod(step, change);
+      step = change;
+      change = rest;
+    }
+    last = x;
+    if (step > 0 && step < finest) return 0;
+  }
+  return step;
+}
 
 std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<double>& values) {
   struct Run {

@@ -16,6 +16,10 @@ void forget_glitches(Log& log);
 /// Throws UserError (unusable) when the heat input is missing in three rows of ten, or no temperature is left at all.
 void mask(Log& log);
 
+/// The step of a channel that knows no values in between; 0 where it has none.
+double step_of(const std::vector<double>& values);
+inline constexpr double coarse_K = 0.4;  // finer steps are lost in what a thermistor wanders by
+
 /// [from, to) row ranges in which a channel stands still at exactly one value although it moves elsewhere.
 std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<double>& values);
 

@@ -8,6 +8,7 @@
 
 #include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
+#include "identify/filled.hpp"
 #include "identify/units.hpp"
 
 namespace identify {
@@ -188,36 +189,47 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
 
 std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
   if (found.verdict != Verdict::unknown_cause) return "";
-  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
-  std::vector<Log> before = logs, after = logs;
+  // The load as it was told last, and as it is told next, where that is not now.
+  std::vector<Log> last = logs, next = logs, sooner;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
       if (!logs[l].has(role)) continue;
-      std::vector<double>&last = before[l].of(role), &next = after[l].of(role);
-      for (std::size_t i = 1; i < last.size(); ++i) {
-        if (std::isnan(last[i])) last[i] = last[i - 1];
+      std::vector<double>&before = last[l].of(role), &after = next[l].of(role);
+      before = after = without_lines(logs[l], role);
+      for (std::size_t i = 1; i < before.size(); ++i) {
+        if (std::isnan(before[i])) before[i] = before[i - 1];
       }
-      for (std::size_t i = next.size() - 1; i-- > 0;) {
-        if (std::isnan(next[i])) next[i] = next[i + 1];
+      for (std::size_t i = before.size(); i-- > 1;) {
+        if (std::isnan(after[i - 1])) after[i - 1] = after[i];
       }
-      next.erase(next.begin());
-      next.push_back(next.back());
     }
   }
-  const Problem held = unseen_by(problem, before), taken = unseen_by(problem, after);
-  double sum = 0, bins = 0, apart_s = 0;
+  sooner = next;
+  for (Log& log : sooner) {
+    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
+      if (log.has(role)) log.of(role).erase(log.of(role).begin()), log.of(role).push_back(log.of(role).back());
+    }
+  }
+  const Problem as_last = unseen_by(problem, last), as_next = unseen_by(problem, next),
+                as_sooner = unseen_by(problem, sooner);
+  double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0, apart_s = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    const Replayed a = replayed(held, found.base.fit, static_cast<int>(l)),
-                   b = replayed(taken, found.base.fit, static_cast<int>(l));
-    const bool housing = problem.logs[l].has_housing;
-    for (std::size_t k = 0; k < a.housing_degC.size(); ++k) {
-      const double moved_K = housing ? a.housing_degC[k] - b.housing_degC[k] : a.core_degC[k] - b.core_degC[k];
-      sum += moved_K * moved_K / 12;
+    const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
+    const auto run = [&](const Problem& p) { return replayed(p, found.base.fit, static_cast<int>(l)).*of; };
+    const std::vector<double> line = run(problem), a = run(as_last), b = run(as_next), c = run(as_sooner);
+    for (std::size_t k = 0; k < line.size(); ++k) {
+      // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
+      const double less_K = (a[k] + b[k]) / 2 - line[k], rise_K = line[k] - line[0];
+      moved2 += (a[k] - c[k]) * (a[k] - c[k]);
+      less2 += less_K * less_K;
+      less_rise += less_K * rise_K;
+      rise2 += rise_K * rise_K;
       ++bins;
     }
     apart_s = std::max(apart_s, problem.logs[l].interval_s);
   }
-  const double doubt_K = std::sqrt(sum / bins);
+  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
+  const double doubt_K = std::sqrt((moved2 / 12 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
   const double left_K =
       disturbance_of(problem, fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})).noise.disturbance_K;
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
@@ -226,7 +238,7 @@ std::string too_sparse(const Problem& problem, const Search& found, const std::v
   if (doubt_K < worth_K || left_K > times * doubt_K) return "";
   return fmt::format(
       "What no cause explains, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
-      "in cells left empty, and when exactly moves the {} by as much; record the current in every row and "
+      "in cells that were not measured, and when exactly moves the {} by as much; record the current in every row and "
       "more often.",
       left_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding");
 }

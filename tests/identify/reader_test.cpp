@@ -8,6 +8,7 @@
 #include <functional>
 #include <random>
 
+#include "identify/filled.hpp"
 #include "identify/log.hpp"
 #include "identify/masks.hpp"
 #include "wire/pc/motor_file.hpp"
@@ -454,6 +455,82 @@ TEST(Masks, GapsInTimeAreCounted) {
   EXPECT_NEAR(log.gap_share, 40.0 / 139, 0.01);
   ASSERT_FALSE(log.notes.empty());
   says(log.notes.back(), "1 gap in time");
+}
+
+/// A noisy housing read every `every` rows of 0.1 s, what lies between as `between` makes it of what was read before
+/// and after and of the share of the way; rounded to `step_K`.
+Log filled_in(int every, const std::function<double(double, double, double)>& between, double step_K,
+              double noise_K = 0.2) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, noise_K);
+  std::string text = head;
+  double before = 20, after = 20;
+  for (int i = 0; i < 3000; ++i) {
+    if (i % every == 0) before = after, after = 25 + 10 * std::sin((i + every) / 900.0) + noise(random);
+    double told = between(before, after, static_cast<double>(i % every) / every);
+    if (step_K > 0) told = step_K * std::round(told / step_K);
+    char row[64];
+    std::snprintf(row, sizeof row, "%.1f,1,%.12g\n", 0.1 * i, told);
+    text += row;
+  }
+  return read(text)[0];
+}
+double hold(double before, double, double) { return before; }
+double line(double before, double after, double share) { return before + share * (after - before); }
+
+std::vector<std::size_t> rows_read(const Log& log) {
+  std::vector<std::size_t> out;
+  const auto& v = log.of(Role::housing);
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (!std::isnan(v[i])) out.push_back(i);
+  }
+  return out;
+}
+
+TEST(Filled, AHeldReadingCountsOnce) {
+  for (const int every : {2, 10, 50}) {
+    for (const double step_K : {0.0, 0.1}) {
+      const Log log = filled_in(every, hold, step_K);
+      const auto rows = rows_read(log);
+      EXPECT_EQ(rows.size(), 3000u / static_cast<std::size_t>(every)) << every << " " << step_K;
+      for (const std::size_t row : rows) EXPECT_EQ(row % static_cast<std::size_t>(every), 0u) << every;
+      ASSERT_FALSE(log.notes.empty());
+      says(log.notes.front(), "housing_degC was filled in by repeating");
+    }
+  }
+}
+TEST(Filled, BetweenReadingsJoinedByLinesNothingWasRead) {
+  for (const int every : {2, 10, 50}) {
+    for (const double step_K : {0.0, 0.001, 0.01}) {
+      const Log log = filled_in(every, line, step_K);
+      const auto rows = rows_read(log);
+      EXPECT_NEAR(static_cast<double>(rows.size()), 3000.0 / every, 0.15 * 3000 / every) << every << " " << step_K;
+      // Where a line bends by less than the rounding, its end is up to a fifth of it off.
+      const auto off = std::count_if(rows.begin(), rows.end(), [&](std::size_t row) {
+        const double read = std::round(static_cast<double>(row) / every) * every;
+        return std::abs(static_cast<double>(row) - read) > every / 5;
+      });
+      EXPECT_LT(off, 0.05 * static_cast<double>(rows.size())) << every << " " << step_K;
+      ASSERT_FALSE(log.notes.empty());
+      says(log.notes.front(), "housing_degC was filled in along straight lines");
+    }
+  }
+}
+TEST(Filled, EveryRowOfANoisyASmoothOrAQuietChannelWasRead) {
+  for (const double noise_K : {0.0, 0.005, 0.05, 0.2}) {
+    for (const double step_K : {0.0, 0.01, 0.0625, 0.1}) {
+      const Log log = filled_in(1, hold, step_K, noise_K);
+      for (const std::string& note : log.notes)
+        EXPECT_EQ(note.find("filled in"), std::string::npos) << note << noise_K << " " << step_K;
+    }
+  }
+}
+TEST(Filled, ACommandedCurrentIsWhatFlowed) {
+  std::string text = head;
+  for (int i = 0; i < 3000; ++i)
+    text += std::to_string(0.1 * i) + "," + std::to_string(i / 50 * 7 % 5) + "," + std::to_string(20 + i % 7) + "\n";
+  const Log log = read(text)[0];
+  EXPECT_EQ(identify::without_lines(log, Role::current), log.of(Role::current));
 }
 
 /// A row a second of a measured current and a housing that warms.

@@ -294,6 +294,19 @@ TEST(BadInput, AGoodLogIsAnsweredUntilItIsSpoilt) {
   EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
 }
 
+TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
+  std::string housing, core;
+  const Outcome r = run(spoilt([&](auto& row, int i) {
+                          if (i > 0 && i % 10 == 1) housing = row[3];
+                          if (i > 0 && !row[5].empty()) core = row[5];
+                          if (i > 0) row[3] = housing, row[5] = core;
+                          return true;
+                        }) +
+                        " --motor ec-16-40w");
+  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("housing_degC was filled in by repeating between readings about 1 s apart"), std::string::npos)
+      << r.out;
+}
 TEST(BadInput, NothingThatVaries) {
   refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "The temperatures move by 0.0 K");
 }

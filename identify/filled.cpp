@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "identify/filled.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identify/masks.hpp"
+#include "identify/median.hpp"
+
+namespace identify {
+namespace {
+
+constexpr std::size_t least_readings = 20;  // of which the pattern must show
+
+/// Readings of a channel, and the rows that they stand in.
+struct Readings {
+  std::vector<std::size_t> row;
+  std::vector<double> t_s, degC;
+};
+
+Readings readings_of(const Log& log, Role role) {
+  Readings out;
+  const auto& v = log.of(role);
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    out.row.push_back(i);
+    out.t_s.push_back(log.of(Role::time)[i]);
+    out.degC.push_back(v[i]);
+  }
+  return out;
+}
+
+/// Is a number of rows `k`, or several times that, but for the row or the quarter that a clock of its own may be off?
+bool is_multiple(double rows, double k) {
+  const double slack = k < 4 ? 0 : std::max(1.0, k / 4);
+  return std::abs(rows - k * std::round(rows / k)) <= slack;
+}
+
+/// Those that a channel holds until the next: its runs of one value are all as long, or twice and thrice where two
+/// readings agree. Empty where it does not hold them.
+std::vector<std::size_t> held(const Readings& r) {
+  std::vector<std::size_t> from = {0};
+  for (std::size_t i = 1; i < r.degC.size(); ++i) {
+    if (r.degC[i] != r.degC[i - 1]) from.push_back(i);
+  }
+  if (from.size() < least_readings) return {};
+  std::vector<double> length;
+  for (std::size_t i = 0; i + 1 < from.size(); ++i) length.push_back(static_cast<double>(from[i + 1] - from[i]));
+  std::vector<double> sorted = length;
+  std::sort(sorted.begin(), sorted.end());
+  const double shortest = sorted[sorted.size() / 10];
+  std::erase_if(sorted, [&](double l) { return l > 1.5 * shortest; });
+  const double k = median(sorted);
+  if (k < 2) return {};
+  // Longer ones, of a motor that rests, say nothing of the pattern.
+  std::erase_if(length, [&](double l) { return l > 6 * k; });
+  const auto fit = std::count_if(length.begin(), length.end(), [&](double l) { return is_multiple(l, k); });
+  if (length.size() < least_readings || 10 * static_cast<std::size_t>(fit) < 9 * length.size()) return {};
+  std::vector<std::size_t> kept;
+  from.push_back(r.degC.size());
+  for (std::size_t i = 0; i + 1 < from.size(); ++i) {
+    const auto agree =
+        static_cast<std::size_t>(std::max(1.0, std::round(static_cast<double>(from[i + 1] - from[i]) / k)));
+    for (std::size_t n = 0; n < agree; ++n) kept.push_back(from[i] + n * (from[i + 1] - from[i]) / agree);
+  }
+  return kept;
+}
+
+/// Those between which a channel follows straight lines. Empty where it does not: noise bends from row to row, and what
+/// is smooth bends little by little.
+std::vector<std::size_t> joined_by_lines(const Readings& r, double step_K) {
+  double most = 0;
+  for (const double x : r.degC) most = std::max(most, std::abs(x));
+  // A rounded cell is off by half a step, and so are the ends of its line; a cell of single precision by 1e-7.
+  const double tolerance_K = step_K > 0 ? 1.01 * step_K : 1e-6 * most;
+  std::vector<std::size_t> kept = {0};
+  std::vector<double> lengths;  // of lines of three rows and more, but for level ones, which any channel may have
+  double bends = 0;             // at the ends of these, seen in the next row
+  double rows = 0;              // of these and of what lies on no line
+  for (std::size_t from = 0; from + 1 < r.degC.size(); from = kept.back()) {
+    const auto run_s = [&](std::size_t i) { return r.t_s[i] - r.t_s[from]; };
+    const auto slope = [&](std::size_t i) { return (r.degC[i] - r.degC[from]) / run_s(i); };
+    double low = -1e300, high = 1e300;  // slopes of lines that pass by all rows so far
+    std::size_t to = from + 1;
+    for (; to + 1 < r.degC.size(); ++to) {
+      low = std::max(low, slope(to) - tolerance_K / run_s(to));
+      high = std::min(high, slope(to) + tolerance_K / run_s(to));
+      if (slope(to + 1) < low || slope(to + 1) > high) break;
+    }
+    kept.push_back(to);
+    if (to - from > 1 && r.degC[to] == r.degC[from]) continue;
+    rows += static_cast<double>(to - from);
+    if (to - from < 2) continue;
+    lengths.push_back(static_cast<double>(to - from));
+    if (to + 1 < r.degC.size())
+      bends += std::abs(r.degC[from] + slope(to) * run_s(to + 1) - r.degC[to + 1]) > 3 * tolerance_K;
+  }
+  if (lengths.size() < least_readings) return {};
+  const double k = median(lengths);
+  double on_lines = 0, alike = 0;
+  for (const double l : lengths) {
+    on_lines += l;
+    if (is_multiple(l, k) && l < 1.5 * k) alike += l;
+  }
+  const bool bend = bends > 0.8 * static_cast<double>(lengths.size());
+  return on_lines > 0.8 * rows && (bend || alike > 0.8 * rows) ? kept : std::vector<std::size_t>{};
+}
+
+/// The column with nothing but these of its readings; as it is where there are none.
+std::vector<double> only(const std::vector<double>& column, const Readings& r, const std::vector<std::size_t>& kept) {
+  if (kept.empty()) return column;
+  std::vector<double> out(column.size(), missing);
+  for (const std::size_t i : kept) out[r.row[i]] = column[r.row[i]];
+  return out;
+}
+
+std::vector<double> without_repeats(const Log& log, Role role) {
+  const Readings r = readings_of(log, role);
+  return only(log.of(role), r, held(r));
+}
+
+}  // namespace
+
+std::vector<double> without_lines(const Log& log, Role role) {
+  const Readings r = readings_of(log, role);
+  return only(log.of(role), r, joined_by_lines(r, step_of(log.of(role))));
+}
+
+void forget_filled(Log& log) {
+  const struct {
+    std::vector<double> (*read_of)(const Log&, Role);
+    const char* how;
+  } ways[] = {{without_repeats, "by repeating"}, {without_lines, "along straight lines"}};
+  const auto count = [](const std::vector<double>& v) {
+    return std::count_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
+  };
+  for (const Role role : {Role::housing, Role::core}) {
+    // Between a coarse sensor's steps nothing is read either (masks.hpp).
+    if (!log.has(role) || step_of(log.of(role)) >= coarse_K) continue;
+    for (const auto& way : ways) {
+      std::vector<double> read = way.read_of(log, role);
+      if (count(read) == count(log.of(role))) continue;
+      log.notes.push_back(fmt::format("{} was filled in {} between readings about {:.2g} s apart; only these are used.",
+                                      own_name(role), way.how,
+                                      log.of(Role::time).back() / static_cast<double>(count(read))));
+      log.of(role) = std::move(read);
+    }
+  }
+}
+
+}  // namespace identify
