@@ -101,11 +101,10 @@ Inputs inputs_of(const Log& log, Bins& out) {
     sink = bridged(log.of(coolant ? Role::coolant : Role::ambient), t);
     if (coolant) out.notes.push_back("The coolant is taken as the sink.");
   } else {
-    const auto& y = log.of(log.has(Role::housing) ? Role::housing : Role::core);
-    const auto first = std::find_if(y.begin(), y.end(), [](double x) { return !std::isnan(x); });
-    sink.assign(t.size(), *first);
+    const double first = std::isnan(log.sink_degC) ? first_degC(log) : log.sink_degC;
+    sink.assign(t.size(), first);
     out.notes.push_back(
-        fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
+        fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", first));
   }
   for (auto& b : in.boundary_degC) b = sink;
   out.has_frame = log.has(Role::frame);
@@ -167,18 +166,21 @@ double width_s_of(const Log& log, double usual_s, double finest_s) {
 }
 
 /// Each sample's drives and boundaries, for as long as it holds, as means over the bins that it touches.
-void add_inputs(Bins& out, const std::vector<double>& t, double usual_s, const Inputs& in) {
+void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in) {
+  const auto& t = log.of(Role::time);
   std::vector<double> covered(out.bins.size(), 0.0);
   for (std::size_t i = 0; i < t.size(); ++i) {
     const double end = i + 1 < t.size() ? t[i + 1] : t[i] + usual_s;
+    const bool pauses = i + 1 < t.size() && resumes(log, t[i], t[i + 1]);
     double from = t[i];
     for (auto b = static_cast<std::size_t>(from / out.width_s + 1e-9); b < out.bins.size() && from < end; ++b) {
+      const double held = pauses && from > t[i] ? 0 : 1;  // for the rest of its bin: what flows in a pause is not known
       const double to = std::min(end, out.width_s * static_cast<double>(b + 1));
       const double share = std::max(0.0, to - from) / out.width_s;
       Bin& bin = out.bins[b];
       covered[b] += share;
-      add_moment(bin, share, in.amplitude_A[i], in.sampled_A[i], in.speed_rad_per_s[i]);
-      bin.input[Drive::power_W] += share * in.power_W[i];
+      add_moment(bin, share, held * in.amplitude_A[i], held * in.sampled_A[i], held * in.speed_rad_per_s[i]);
+      bin.input[Drive::power_W] += share * held * in.power_W[i];
       for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary_degC[s][i];
       from = to;
     }
@@ -206,7 +208,11 @@ double first_reading(const Bins& log, double Bin::*reading, std::size_t from, st
 void find_starts(Bins& out, const Log& log) {
   for (const double s : log.resumes_s) {
     const auto bin = static_cast<std::size_t>(s / out.width_s + 1e-9);
-    if (bin > out.starts.back().bin && bin < out.bins.size()) out.starts.push_back({.bin = bin});
+    if (bin <= out.starts.back().bin || bin >= out.bins.size()) continue;
+    const auto& t = log.of(Role::time);
+    const double told_s = *std::prev(std::lower_bound(t.begin(), t.end(), s)) + out.interval_s;
+    const auto silent = static_cast<std::size_t>(std::ceil(told_s / out.width_s - 1e-9));
+    out.starts.push_back({.bin = bin, .paused = bin - std::min(silent, bin)});
   }
   for (std::size_t i = 0; i < out.starts.size(); ++i) {
     Start& start = out.starts[i];
@@ -285,7 +291,7 @@ Bins bins_of(const Log& log, double finest_s) {
   out.bins.assign(std::max<std::size_t>(count, 1), Bin{});
   for (Bin& bin : out.bins) bin.housing_degC = bin.core_degC = missing;
   const Inputs in = inputs_of(log, out);
-  add_inputs(out, t, usual_s, in);
+  add_inputs(out, log, usual_s, in);
   if (!log.has(Role::speed)) {
     for (Bin& bin : out.bins) bin.stalled_A2 = 0;  // it may have turned
   }
@@ -308,7 +314,7 @@ Bins merged(const Bins& log, std::size_t together) {
   Bins out = log;
   out.width_s = log.width_s * static_cast<double>(together);
   out.bins.clear();
-  for (Start& start : out.starts) start.bin = (start.bin + together - 1) / together;
+  for (Start& start : out.starts) start.bin = (start.bin + together - 1) / together, start.paused /= together;
   // Of a bin in which the log begins again only what was before.
   const auto begun_again = [&](std::size_t k) {
     return std::any_of(log.starts.begin(), log.starts.end(), [&](const Start& start) {

@@ -48,6 +48,7 @@ struct Bin {
 struct Start {
   std::size_t bin = 0;
   double housing_degC = missing, core_degC = missing;  // as the first readings say; NaN: none
+  std::size_t paused = 0;                              // bins before it in which nothing is told
 };
 
 struct Bins {

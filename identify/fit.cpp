@@ -61,7 +61,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
   return out;
 }
 
-/// What simulates log `l` at coordinates x; local directions: base, causes, then the log's own two.
+/// What simulates log `l` at coordinates x; local directions: base, causes, then the two of a start.
 template <class S>
 Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, int l) {
   using std::exp;
@@ -189,7 +189,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
     constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
     replay<most_nodes>(model, log, initial, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
       const Bin& bin = log.bins[k];
-      if (begun < log.starts.size() && k == log.starts[begun].bin) {
+      while (begun < log.starts.size() && k == log.starts[begun].bin) {
         take_sums();
         for (Predicted<N>* p : {&of_housing, &of_core}) {
           p->wander.forget(initial[begun].core_degC);
@@ -535,8 +535,13 @@ Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f) {
   const Eigen::Index shared = base_count + f.cause_coordinates();
   out.x.head(shared) = f.x.head(shared);
   for (int l = 0; l < static_cast<int>(whole.logs.size()); ++l) {
-    const Eigen::Index known = own_count(fitted.logs[static_cast<std::size_t>(l)]);
-    out.x.segment(initial_of(whole, out, l), known) = f.x.segment(initial_of(fitted, f, l), known);
+    const auto& starts = fitted.logs[static_cast<std::size_t>(l)].starts;
+    for (std::size_t s = 0; s < starts.size(); ++s) {
+      if (s > 0 && std::isnan(starts[s].housing_degC) && std::isnan(starts[s].core_degC)) continue;
+      const auto at = per_start_count * static_cast<Eigen::Index>(s);
+      out.x.segment(initial_of(whole, out, l) + at, per_start_count) =
+          f.x.segment(initial_of(fitted, f, l) + at, per_start_count);
+    }
   }
   return out;
 }

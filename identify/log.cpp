@@ -435,6 +435,15 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
     throw UserError(Exit::usage, where + ": " + own_name(role) + " was given a column before; give each role one.");
 }
 
+bool resumes(const Log& log, double after_s, double until_s) {
+  return std::any_of(log.resumes_s.begin(), log.resumes_s.end(), [&](double s) { return s > after_s && s <= until_s; });
+}
+
+double first_degC(const Log& log) {
+  const auto& v = log.of(log.has(Role::housing) ? Role::housing : Role::core);
+  return *std::find_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
+}
+
 Log without_last(Log log, double fraction) {
   const auto& t = log.of(Role::time);
   const auto end = std::lower_bound(t.begin(), t.end(), (1 - fraction) * t.back());

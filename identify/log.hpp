@@ -74,12 +74,19 @@ struct Log {
   double missing_share = 0;  // of housing (else core) readings, of input cells or of whole rows: the worst of these
   double gap_share = 0;      // of the duration, what lies in gaps
   std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
+  double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
   std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }
   bool has(Role r) const { return !of(r).empty(); }
 };
+
+/// Does it go on, after a pause, between these times?
+bool resumes(const Log& log, double after_s, double until_s);
+
+/// The housing's, or the winding's, first reading.
+double first_degC(const Log& log);
 
 /// The rows before the last `fraction` of the log's time.
 Log without_last(Log log, double fraction);

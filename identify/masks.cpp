@@ -117,11 +117,6 @@ void read_between_steps(Log& log, Role role) {
       own_name(role), step_K, unhurried.size(), steps.size()));
 }
 
-/// After a pause in what heats (pauses.hpp).
-bool resumes(const Log& log, double at_s) {
-  return std::find(log.resumes_s.begin(), log.resumes_s.end(), at_s) != log.resumes_s.end();
-}
-
 /// Share of a channel that is missing. One that comes regularly but not in every row, as from a bus whose messages were
 /// written one a row, is judged by its own interval.
 double missing_of_input(const Log& log, Role role) {
@@ -130,7 +125,7 @@ double missing_of_input(const Log& log, Role role) {
   double last_s = missing, pauses_s = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (std::isnan(v[i])) continue;
-    if (resumes(log, t[i]))
+    if (resumes(log, last_s, t[i]))
       pauses_s += t[i] - last_s;
     else if (!std::isnan(last_s))
       spacing_s.push_back(t[i] - last_s);
@@ -188,7 +183,7 @@ void note_gaps(Log& log) {
   int gaps = 0;
   for (std::size_t i = 0; i < spacing.size(); ++i) {
     const double dt = spacing[i];
-    if (resumes(log, t[i + 1])) {
+    if (resumes(log, t[i], t[i + 1])) {
       lost_s += dt - usual;
       continue;
     }

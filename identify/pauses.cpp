@@ -27,8 +27,8 @@ Role heat_of(const Log& log) {
   return Role::iq;
 }
 
-/// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps, or
-/// goes one way; a coarse one repeats itself.
+/// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps,
+/// or goes one way; a coarse one repeats itself.
 bool is_noisy(const std::vector<double>& v, double range) {
   double last = missing, change = 0;
   int rows = 0, turns = 0;
@@ -52,8 +52,13 @@ void forget_frozen_input(Log& log) {
   const auto& t = log.of(Role::time);
   double range = 0;
   for (const double x : v) range = std::abs(x) > range ? std::abs(x) : range;
-  if (!is_noisy(v, range)) return;
-  for (const auto& [from, to] : frozen_runs(v)) {
+  const auto frozen = frozen_runs(v);
+  std::vector<double> elsewhere = v;
+  for (const auto& [from, to] : frozen)
+    std::fill(elsewhere.begin() + static_cast<std::ptrdiff_t>(from),
+              elsewhere.begin() + static_cast<std::ptrdiff_t>(to), missing);
+  if (!is_noisy(elsewhere, range)) return;
+  for (const auto& [from, to] : frozen) {
     const double stood_s = t[to - 1] - t[from];
     if (std::abs(v[from]) < 0.1 * range || stood_s < least_s) continue;
     log.notes.push_back(fmt::format("{} stood frozen at {:.4g} for {:.0f} s from {:.0f} s; what flowed is not known.",
@@ -86,16 +91,6 @@ Log part_of(const Log& log, std::size_t from, std::size_t to) {
   return part;
 }
 
-/// Of a log that tells no sink, all parts have the one it began at.
-void settle_sink(Log& log) {
-  if (log.has(Role::ambient) || log.has(Role::coolant)) return;
-  const auto& y = log.of(log.has(Role::housing) ? Role::housing : Role::core);
-  const auto first = std::find_if(y.begin(), y.end(), [](double x) { return !std::isnan(x); });
-  log.of(Role::ambient).assign(y.size(), *first);
-  log.notes.push_back(
-      fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", *first));
-}
-
 /// Where a pause ends, among the rows that tell the heat: those that come after far longer than both their neighbours.
 std::vector<std::size_t> ends_of_pauses(const std::vector<double>& told_s) {
   std::vector<double> spacing_s;
@@ -103,8 +98,10 @@ std::vector<std::size_t> ends_of_pauses(const std::vector<double>& told_s) {
   const double usual_s = median(spacing_s);
   std::vector<std::size_t> ends;
   for (std::size_t k = 0; k < spacing_s.size(); ++k) {
-    const double before_s = k > 0 ? spacing_s[k - 1] : 0, after_s = k + 1 < spacing_s.size() ? spacing_s[k + 1] : 0;
-    if (spacing_s[k] > std::max(pause_s, pause_rows * std::max({usual_s, before_s, after_s}))) ends.push_back(k + 1);
+    const auto at = [&](std::size_t i) { return i < spacing_s.size() ? spacing_s[i] : 0; };
+    // One row alone in a pause ends none.
+    const double around_s = std::max({usual_s, std::min(at(k - 1), at(k + 1)), at(k - 2), at(k + 2)});
+    if (spacing_s[k] > std::max(pause_s, pause_rows * around_s)) ends.push_back(k + 1);
   }
   if (static_cast<double>(ends.size()) > std::max(1.0, most_share * static_cast<double>(told_s.size()))) return {};
   std::stable_sort(ends.begin(), ends.end(),
@@ -164,13 +161,13 @@ std::vector<Log> parts_between_pauses(Log log) {
     if (t[row] - t[row - 1] > long_s) ends.push_back(row);
   }
   if (ends.empty() || (!log.has(Role::housing) && !log.has(Role::core))) return {std::move(log)};
-  settle_sink(log);
   ends.push_back(t.size());
   std::vector<Log> parts;
   double left_out_s = 0;
   std::size_t from = 0;
   for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
+    part.sink_degC = first_degC(log);
     const auto read = [&](Role role) {
       const auto& v = part.of(role);
       return std::count_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });

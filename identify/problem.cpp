@@ -44,13 +44,14 @@ void noise_from_rest(Problem& problem) {
       n += static_cast<int>(differences.size());
       differences.clear();
     };
-    for (std::size_t k = 0; k < log.bins.size(); ++k) {
+    for (std::size_t k = 0, begun = 1; k < log.bins.size(); ++k) {
       resting = log.bins[k].idle ? resting + 1 : 0;
+      if (begun < log.starts.size() && k == log.starts[begun].bin) ++begun, resting = 0;
       if (resting == 0 || differences.size() >= block) close();
       if (resting <= 2 * j + after_load) continue;
-      rest_s += log.width_s;
       const Bin &a = log.bins[k - 2 * j], &b = log.bins[k - j], &c = log.bins[k];
       if (std::isnan(a.housing_degC) || std::isnan(b.housing_degC) || std::isnan(c.housing_degC)) continue;
+      rest_s += log.width_s;
       differences.push_back(a.housing_degC - 2 * b.housing_degC + c.housing_degC);
       white += log.housing_noise_K * log.housing_noise_K *
                (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) +

@@ -157,12 +157,16 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   Vector T = Vector::Constant(initial.front().housing_degC), next;
   const int housing = set.housing.node;
   const bool lags = value_of(set.housing.lag_s) > 0;
-  S lagged(0), keep(0), mean_keep(0);
+  S lagged(0), keep(0), mean_keep(0), left(0);
   std::size_t begun = 0;
-  // After a pause a further mass goes on from where it was; that it depends on the earlier start is left out.
+  // After a pause a further mass goes on from where it is; that this depends on the earlier start is left out.
   const auto begin = [&](const Initial<S>& from) {
     for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.core_degC);
     T[housing] = lagged = from.housing_degC;
+    // A late sensor is where it reads, and not where the housing is.
+    const double read = log.starts[begun].housing_degC;
+    if (begun > 0 && lags && !std::isnan(read))
+      lagged = (set.housing.gain_error * 25.0 - set.housing.offset_K + read) / (set.housing.gain_error + 1.0);
     T[model.core] = from.core_degC;
     if (model.hot_node >= 0) T[model.hot_node] = from.core_degC;
     ++begun;
@@ -182,7 +186,14 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
 
   for (std::size_t k = 0; k < log.bins.size(); ++k) {
     const Bin& bin = log.bins[k];
-    if (begun < log.starts.size() && k == log.starts[begun].bin) begin(initial[begun]);
+    while (begun < log.starts.size() && k == log.starts[begun].bin) begin(initial[begun]);  // merged bins: several
+    if (n > 2 && begun < log.starts.size() && k + log.starts[begun].paused >= log.starts[begun].bin) {
+      // In a pause it follows the housing, from where that was to where it is found.
+      const std::size_t paused = log.starts[begun].paused, into = k + paused - log.starts[begun].bin;
+      if (into == 0) left = T[housing];
+      const double share = (static_cast<double>(into) + 0.5) / static_cast<double>(paused);
+      T[housing] = T[model.core] = left + (value_of(initial[begun].housing_degC) - left) * share;
+    }
     if (corrected) {
       correct(model, log, splines, k, in);
       next = network.step(transition, T, in);

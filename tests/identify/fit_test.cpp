@@ -159,6 +159,22 @@ TEST(Bins, WhatIsMergedBeginsAgainWhereTheLogDoes) {
   EXPECT_EQ(merged.bins[3].housing_degC, 50);
 }
 
+TEST(Replay, WhereSeveralPausesEndInOneMergedBinTheLastCounts) {
+  const auto at_the_end = [](std::size_t together) {
+    Problem problem = problem_from(off_sheet(9));
+    const Fit f = identify::fit(problem, {});
+    identify::Bins& log = problem.logs[0];
+    for (const std::size_t bin : {200u, 201u, 300u}) log.starts.push_back({.bin = bin});
+    log = identify::merged(log, together);
+    Fit begun = f;
+    begun.x.resize(f.x.size() + 6);
+    begun.x << f.x, 30, 0, 50, 0, 70, 0;
+    const identify::Replayed all = identify::replayed(problem, begun, 0);
+    return all.housing_degC[(300 + 2 * together) / together];
+  };
+  EXPECT_NEAR(at_the_end(10), at_the_end(1), 2) << "begun at 70 degC last";
+}
+
 TEST(Fit, RecoversParametersWithinItsStatedErrors) {
   const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
   int inside = 0, all = 0;

@@ -647,6 +647,25 @@ TEST(Pauses, OfManyTheLongestCount) {
   EXPECT_EQ(logs[0].resumes_s.size(), 24u);
   EXPECT_GT(logs[0].resumes_s[23], 5800);
 }
+TEST(Pauses, OneRowAloneInOneEndsItNot) {
+  const auto log = read(recording(600, [](int i, double&, double&) { return i < 200 || i == 260 || i >= 320; }))[0];
+  EXPECT_EQ(log.resumes_s, (std::vector<double>{260, 320}));
+}
+TEST(Pauses, ManyCurrentsThatStandStillDoNotHideEachOther) {
+  const auto log = read(recording(2000, [](int i, double& current_A, double&) {
+    if (i % 200 >= 110) current_A = 1.4321;
+    return true;
+  }))[0];
+  EXPECT_EQ(log.resumes_s.size(), 9u);
+}
+TEST(Pauses, OfACurrentInOtherRowsThanTheFirstTheyAreNoHole) {
+  std::string text = "time_s,iq_A,id_A,housing_degC\n";
+  for (int i = 0; i < 1000; ++i) {
+    if (i < 300 || i >= 700)
+      text += std::to_string(i) + (i % 2 == 0 ? ",2,," : ",,0.1,") + std::to_string(20 + 0.03 * i + i % 3) + "\n";
+  }
+  EXPECT_LT(read(text)[0].missing_share, 0.1);
+}
 TEST(Pauses, WhatIsTooShortBetweenLongOnesIsLeftOutAndSaid) {
   const auto logs = read(recording(2000, [](int i, double&, double&) { return i < 150 || i / 20 == 50 || i >= 1800; }));
   ASSERT_EQ(logs.size(), 2u);
