@@ -21,6 +21,7 @@ using wire::pc::UserError;
 
 // A logger's row is below a kilobyte; a line of this size is a file without line ends, or not a table at all.
 constexpr std::size_t longest_line = 1 << 20;
+constexpr std::size_t least_columns = 3;  // a time, what heats, and a temperature
 
 std::string_view trimmed(std::string_view s) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -82,15 +83,19 @@ bool digits(std::string_view s, int& value) {
   return error == std::errc() && end == s.data() + s.size() && s.front() != '-';
 }
 
-/// 08:15:30.5 as seconds.
+/// 08:15:30.5 as seconds, or what a stopwatch shows, 1:05.3 or 2:01:05 (with a fraction where there are no hours: 12:30
+/// may be a time of day).
 bool time_of_day(std::string_view s, double& value) {
-  int hour = 0, minute = 0;
-  if (s.size() < 8 || s[2] != ':' || s[5] != ':' || !digits(s.substr(0, 2), hour) || !digits(s.substr(3, 2), minute))
-    return false;
+  int first = 0, minute = 0;
+  const std::size_t colon = s.find(':'), last = s.rfind(':');
+  if (colon == std::string_view::npos || colon > 2 || !digits(s.substr(0, colon), first)) return false;
+  const std::string_view seconds = s.substr(last + 1);
+  if (seconds.size() < 2 || (colon == last && seconds.size() < 4)) return false;
+  if (colon != last && (last != colon + 3 || !digits(s.substr(colon + 1, 2), minute))) return false;
   double second = 0;
-  const auto [end, error] = std::from_chars(s.data() + 6, s.data() + s.size(), second);
-  if (error != std::errc() || end != s.data() + s.size() || !(second >= 0 && second < 61)) return false;
-  value = 3600 * hour + 60 * minute + second;
+  const auto [end, error] = std::from_chars(seconds.data(), seconds.data() + seconds.size(), second);
+  if (error != std::errc() || end != seconds.data() + seconds.size() || !(second >= 0 && second < 61)) return false;
+  value = (colon == last ? 60 * first : 3600 * first + 60 * minute) + second;
   return true;
 }
 
@@ -158,6 +163,17 @@ char separator_of(std::string_view header) {
   return best;
 }
 
+/// Has one of the next lines the columns of a log?
+bool widens(std::string_view rest) {
+  for (int line = 0; line < 50 && !rest.empty(); ++line) {
+    const std::string_view row = rest.substr(0, rest.find('\n'));
+    if (std::count(row.begin(), row.end(), separator_of(row)) + 1 >= static_cast<std::ptrdiff_t>(least_columns))
+      return true;
+    rest.remove_prefix(std::min(row.size() + 1, rest.size()));
+  }
+  return false;
+}
+
 }  // namespace
 
 int Table::find(const std::string& name) const {
@@ -202,6 +218,7 @@ Table read_table(const std::string& path) {
     if (table.names.empty()) {
       separator = separator_of(row);
       if (!split(row, separator, cells)) refuse(line, "a quote is opened and never closed; repair the header.");
+      if (cells.size() < least_columns && widens(rest)) continue;  // what some loggers write before the table
       double unused = 0;
       const bool numbers = number(cells.front(), separator == ';', unused) && std::isfinite(unused);
       header = cells;

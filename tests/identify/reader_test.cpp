@@ -199,6 +199,17 @@ TEST(Reader, WordsInAColumnThatNothingUsesDoNoHarm) {
       "stamp,time_s,current_A,housing_degC,state\n2026-11-22 12:00:00,0,1,20,rest\n2026-11-22 12:00:01,1,2,21,push\n");
   EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[1], 2);
 }
+TEST(Reader, WhatALoggerWritesBeforeTheTableIsSkippedAndAStopwatchIsRead) {
+  ColumnMap map;
+  for (const char* column : {"time_s=Time (s)", "current_A=Current", "housing_degC=Body"})
+    identify::add_column(map, column);
+  const Log log = read(
+      "\"Device: X\"\n\"Rate\",\"3.3\"\n\"Time (s)\",\"Current\",\"Body\"\n\"0:59.7\",\"1\",\"20\"\n"
+      "\"1:00.1\",\"1\",\"21\"\n\"1:00:00.5\",\"1\",\"22\"\n",
+      map)[0];
+  EXPECT_NEAR(log.of(Role::time)[1], 0.4, 1e-9);
+  EXPECT_NEAR(log.of(Role::time)[2], 3540.8, 1e-9);
+}
 TEST(Reader, AnEmptyFileIsRefused) { says(complaint(""), "the file is empty"); }
 TEST(Reader, AHeaderAloneIsRefused) { says(complaint(head), "no row"); }
 TEST(Reader, NumbersInsteadOfAHeaderAreRefused) { says(complaint("0,1,20\n1,1,20\n"), "where the header should be"); }
