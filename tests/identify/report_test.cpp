@@ -145,6 +145,7 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
 }
 
 TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousing) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.seconds = 2400;
   const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
@@ -158,6 +159,7 @@ TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousin
 }
 
 TEST(Report, EachOfTwoCausesHasEvidenceOfItsOwnAndTheNextBestInItsPlace) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.core_every_s = 20;
   options.seconds = 1800;
