@@ -9,6 +9,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
+ordered_json words(const std::string& s) { return s.empty() ? ordered_json(nullptr) : ordered_json(s); }
+
 ordered_json number(double v) { return std::isfinite(v) ? ordered_json(v) : ordered_json(nullptr); }
 
 ordered_json parameters(const std::vector<ParameterLine>& lines) {
@@ -64,7 +66,7 @@ std::string as_json(const Report& r) {
   base["converged"] = r.converged;
   base["checks"] = r.checks;
   base["not_determined"] = r.loose;
-  base["core_refused"] = r.core_refusal.empty() ? ordered_json(nullptr) : ordered_json(r.core_refusal);
+  base["core_refused"] = words(r.core_refusal);
   base["variants"] = ordered_json::array();
   for (const Variant& v : r.variants) base["variants"].push_back({{"what", v.what}, {"rmse_K", rms(v.rmse)}});
   base["gauge"] = "temperatures do not change under (heat, R, C) -> (g heat, R/g, g C)";
@@ -93,7 +95,8 @@ std::string as_json(const Report& r) {
                        {"rmse_after_K", rms(r.held_out->after)},
                        {"nearest", r.held_out->nearest},
                        {"worst_before_K", number(worst(r.held_out->before))},
-                       {"worst_after_K", number(worst(r.held_out->after))}};
+                       {"worst_after_K", number(worst(r.held_out->after))},
+                       {"against", words(r.held_out->against)}};
   }
   if (r.held_out && r.held_out->before_95) {
     const auto pair = [](const Interval& i) { return ordered_json::array({number(i.low), number(i.high)}); };
@@ -120,7 +123,8 @@ std::string as_json(const Report& r) {
     }
     out["experiment"] = {{"separates", r.experiment->separates}, {"profile", profile}, {"why", r.experiment->why}};
   }
-  out["model_file"] = r.model_file.empty() ? ordered_json(nullptr) : ordered_json(r.model_file);
+  out["model_file"] = words(r.model_file);
+  out["no_model"] = words(r.no_model);
   out["reasoning"] = r.reasoning;
   // A path or a column's name need not be UTF-8.
   return out.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";

@@ -134,6 +134,8 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
     held.logs = bench_logs({held_out});
     const identify::Report report = identify::discover(bench_logs({fitted}), motor, held);
     EXPECT_NE(report.verdict, "unknown_cause");
+    const json told = json::parse(identify::as_json(report))["held_out"]["against"];
+    EXPECT_EQ(told.is_null(), report.sentence.find("held out") == std::string::npos) << told;
     return report.sentence;
   };
   EXPECT_EQ(sentence().find("held out"), std::string::npos);
@@ -548,10 +550,11 @@ TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
   const std::string model = (std::filesystem::temp_directory_path() / "hotcore_no_model.toml").string();
   const auto asked = [&](const tests::BenchOptions& options) {
     std::filesystem::remove(model);
-    const Outcome r =
-        run(tests::write_bench_log("hotcore_no_model.csv", options) + " --motor ec-16-40w --write-model " + model);
+    const Outcome r = run(tests::write_bench_log("hotcore_no_model.csv", options) +
+                          " --motor ec-16-40w --json - --write-model " + model);
     EXPECT_EQ(std::filesystem::exists(model), r.code == 0) << r.out;
-    EXPECT_NE(r.out.find("Verdict:"), std::string::npos) << r.out;
+    EXPECT_EQ(r.out.find("\"no_model\": null") != std::string::npos, r.code == 0) << r.out;
+    EXPECT_NE(r.out.find("\"verdict\":"), std::string::npos) << r.out;
     return r;
   };
   tests::BenchOptions options;
