@@ -17,56 +17,88 @@ constexpr double most_fine_bins = 36000;
 
 using thermal::Drive;
 
-/// The slow part of the housing noise, from rest. Second differences over eight seconds cancel the cooling curve's
-/// slope; a first-order process of 20 s correlation keeps this much of its variance in them. Of means over a second:
-/// what the white part leaves in the squares is then small.
+/// Second differences, over a lag, of means over a second at rest: they cancel the slope of a cooling curve.
+struct AtRest {
+  double sum = 0;    // of their squares
+  double white = 0;  // of these, what readings that are noisy each for itself account for
+  double s = 0;      // of rest
+  int n = 0;
+
+  /// Share of its variance that a first-order process keeps in them.
+  static double kept(double lag_s, double slow_s) {
+    const double rho = std::exp(-lag_s / slow_s);
+    return 6 - 8 * rho + 2 * rho * rho;
+  }
+};
+
+AtRest at_rest(const Bins& fine, double lag_s) {
+  AtRest out;
+  const Bins log = merged(fine, static_cast<std::size_t>(std::max(1.0, std::round(1 / fine.width_s))));
+  const auto j = static_cast<std::size_t>(std::max(1.0, std::round(lag_s / log.width_s)));
+  const auto block = static_cast<std::size_t>(90 / log.width_s) + 1;
+  const auto after_load = static_cast<std::size_t>(20 / log.width_s);  // the winding still empties into the housing
+  std::size_t resting = 0;
+  std::vector<double> differences;
+  const auto close = [&] {  // what a block's differences share is the cooling curve's curvature
+    double mean = 0;
+    for (const double d : differences) mean += d / static_cast<double>(differences.size());
+    for (const double d : differences)
+      out.sum += (d - mean) * (d - mean) * 1.2;  // a block holds about six independent ones
+    out.n += static_cast<int>(differences.size());
+    differences.clear();
+  };
+  for (std::size_t k = 0, begun = 1; k < log.bins.size(); ++k) {
+    resting = log.bins[k].idle ? resting + 1 : 0;
+    if (begun < log.starts.size() && k == log.starts[begun].bin) ++begun, resting = 0;
+    if (resting == 0 || differences.size() >= block) close();
+    if (resting <= 2 * j + after_load) continue;
+    const Bin &a = log.bins[k - 2 * j], &b = log.bins[k - j], &c = log.bins[k];
+    if (std::isnan(a.housing_degC) || std::isnan(b.housing_degC) || std::isnan(c.housing_degC)) continue;
+    out.s += log.width_s;
+    differences.push_back(a.housing_degC - 2 * b.housing_degC + c.housing_degC);
+    out.white += log.housing_noise_K * log.housing_noise_K *
+                 (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) +
+                  1 / static_cast<double>(c.housing_n));
+  }
+  close();
+  return out;
+}
+
+/// White and slow part of the housing noise: of one reading from its differences, the rest from rest.
 void noise_from_rest(Problem& problem) {
-  constexpr double lag_s = 8;
-  const double slow_s = problem.noise.slow_s;
-  const double rho = std::exp(-lag_s / slow_s), kept = 6 - 8 * rho + 2 * rho * rho;
-  double sum = 0, white = 0, rest_s = 0, reading2 = 0;
-  int n = 0, logs = 0;
-  for (const Bins& fine : problem.logs) {
-    if (!fine.has_housing) continue;
-    const Bins log = merged(fine, static_cast<std::size_t>(std::max(1.0, std::round(1 / fine.width_s))));
+  // Over eight seconds what is white is little beside what is slow; over two it is much.
+  constexpr double lag_s = 8, short_s = 2;
+  AtRest all, close_by;
+  double reading2 = 0;
+  int logs = 0;
+  const auto add = [](AtRest& to, const AtRest& more) {
+    to.sum += more.sum, to.white += more.white, to.s += more.s, to.n += more.n;
+  };
+  for (const Bins& log : problem.logs) {
+    if (!log.has_housing) continue;
     reading2 += log.housing_noise_K * log.housing_noise_K;
     ++logs;
-    const auto j = static_cast<std::size_t>(std::max(1.0, std::round(lag_s / log.width_s)));
-    const auto block = static_cast<std::size_t>(90 / log.width_s) + 1;
-    const auto after_load = static_cast<std::size_t>(20 / log.width_s);  // the winding still empties into the housing
-    std::size_t resting = 0;
-    std::vector<double> differences;
-    const auto close = [&] {  // what a block's differences share is the cooling curve's curvature
-      double mean = 0;
-      for (const double d : differences) mean += d / static_cast<double>(differences.size());
-      for (const double d : differences)
-        sum += (d - mean) * (d - mean) * 1.2;  // a block holds about six independent ones
-      n += static_cast<int>(differences.size());
-      differences.clear();
-    };
-    for (std::size_t k = 0, begun = 1; k < log.bins.size(); ++k) {
-      resting = log.bins[k].idle ? resting + 1 : 0;
-      if (begun < log.starts.size() && k == log.starts[begun].bin) ++begun, resting = 0;
-      if (resting == 0 || differences.size() >= block) close();
-      if (resting <= 2 * j + after_load) continue;
-      const Bin &a = log.bins[k - 2 * j], &b = log.bins[k - j], &c = log.bins[k];
-      if (std::isnan(a.housing_degC) || std::isnan(b.housing_degC) || std::isnan(c.housing_degC)) continue;
-      rest_s += log.width_s;
-      differences.push_back(a.housing_degC - 2 * b.housing_degC + c.housing_degC);
-      white += log.housing_noise_K * log.housing_noise_K *
-               (1 / static_cast<double>(a.housing_n) + 4 / static_cast<double>(b.housing_n) +
-                1 / static_cast<double>(c.housing_n));
-    }
-    close();
+    add(all, at_rest(log, lag_s));
+    add(close_by, at_rest(log, short_s));
   }
   Noise& noise = problem.noise;
   // A perfectly repeating channel still has its last digit.
   noise.housing_white_K = std::max(0.01, logs > 0 ? std::sqrt(reading2 / logs) : 0.2);
+  const double kept = AtRest::kept(lag_s, noise.slow_s);
   const double assumed2 = 0.05 * 0.05;  // a thermistor's slow wander where no rest tells
-  const double seen2 = n > 0 ? std::max(0.0, (sum - white) / (n * kept)) : assumed2;
-  const double trust = rest_s / (rest_s + 300);  // five minutes of rest count as much as what is assumed
+  // A filtered sensor differs little from reading to reading, and yet wanders within a second or two.
+  if (close_by.n > 0 && close_by.white > 0) {
+    const double more = (close_by.sum - AtRest::kept(short_s, noise.slow_s) * assumed2 * close_by.n) / close_by.white;
+    const double independent = close_by.s / (2 * short_s);
+    if (more > 1 + 3 * std::sqrt(2 / independent)) {
+      noise.housing_white_K *= std::sqrt(more);
+      all.white *= more;
+    }
+  }
+  const double seen2 = all.n > 0 ? std::max(0.0, (all.sum - all.white) / (all.n * kept)) : assumed2;
+  const double trust = all.s / (all.s + 300);  // five minutes of rest count as much as what is assumed
   noise.housing_slow_K = std::clamp(std::sqrt(trust * seen2 + (1 - trust) * assumed2), 0.02, 1.0);
-  noise.idle_s = rest_s;
+  noise.idle_s = all.s;
 
   // Winding: a dense channel shows its noise; readings further apart than the winding's own motion do not.
   double core2 = 0;

@@ -146,6 +146,24 @@ TEST(Fit, APauseInWhichTheMotorRanOnCostsNoParameter) {
   EXPECT_GT(bridged, 4);
 }
 
+TEST(Problem, AFilterTakesNoNoiseAwayThatLastsLongerThanItself) {
+  tests::BenchOptions options = off_sheet(3);
+  options.step_K = 0;
+  options.seconds = 1500;
+  auto logs =
+      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_filter.csv", options)), {}, std::nullopt);
+  const double plain_K = identify::problem_of(logs, sheet).noise.housing_white_K;
+  EXPECT_NEAR(plain_K, options.white_K, 0.02);
+  const auto filtered_K = [&](double tau_s) {
+    auto filtered = logs;
+    double shown = options.start_degC;
+    for (double& x : filtered[0].of(identify::Role::housing)) x = shown += (x - shown) * (1 - std::exp(-0.1 / tau_s));
+    return identify::problem_of(filtered, sheet).noise.housing_white_K;
+  };
+  EXPECT_NEAR(filtered_K(0.3), plain_K, 0.06) << "0.03 from row to row";
+  EXPECT_GT(filtered_K(1), plain_K / 3) << "0.01 from row to row";
+}
+
 TEST(Bins, WhatIsMergedBeginsAgainWhereTheLogDoes) {
   identify::Bins log;
   log.width_s = 1;
