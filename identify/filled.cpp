@@ -68,18 +68,24 @@ std::vector<std::size_t> held(const Readings& r) {
   return kept;
 }
 
-/// Those between which a channel follows straight lines. Empty where it does not: noise bends from row to row, and what
-/// is smooth bends little by little.
-std::vector<std::size_t> joined_by_lines(const Readings& r, double step_K) {
+/// Rows from .. to of a line, or two rows that no line joins to others.
+struct Line {
+  std::size_t from, to;
+  bool joins() const { return to - from > 1; }
+};
+
+/// The lines that a channel follows from row to row. Empty where it does not: noise bends from row to row, and what is
+/// smooth bends little by little.
+std::vector<Line> lines_of(const Readings& r, double step_K) {
   double most = 0;
   for (const double x : r.degC) most = std::max(most, std::abs(x));
   // A rounded cell is off by half a step, and so are the ends of its line; a cell of single precision by 1e-7.
   const double tolerance_K = step_K > 0 ? 1.01 * step_K : 1e-6 * most;
-  std::vector<std::size_t> kept = {0};
-  std::vector<double> lengths;  // of lines of three rows and more, but for level ones, which any channel may have
+  std::vector<Line> lines;
+  std::vector<double> lengths;  // of those that join, but for level ones, which any channel may have
   double bends = 0;             // at the ends of these, seen in the next row
   double rows = 0;              // of these and of what lies on no line
-  for (std::size_t from = 0; from + 1 < r.degC.size(); from = kept.back()) {
+  for (std::size_t from = 0; from + 1 < r.degC.size(); from = lines.back().to) {
     const auto run_s = [&](std::size_t i) { return r.t_s[i] - r.t_s[from]; };
     const auto slope = [&](std::size_t i) { return (r.degC[i] - r.degC[from]) / run_s(i); };
     double low = -1e300, high = 1e300;  // slopes of lines that pass by all rows so far
@@ -89,10 +95,10 @@ std::vector<std::size_t> joined_by_lines(const Readings& r, double step_K) {
       high = std::min(high, slope(to) + tolerance_K / run_s(to));
       if (slope(to + 1) < low || slope(to + 1) > high) break;
     }
-    kept.push_back(to);
-    if (to - from > 1 && r.degC[to] == r.degC[from]) continue;
+    lines.push_back({from, to});
+    if (lines.back().joins() && r.degC[to] == r.degC[from]) continue;
     rows += static_cast<double>(to - from);
-    if (to - from < 2) continue;
+    if (!lines.back().joins()) continue;
     lengths.push_back(static_cast<double>(to - from));
     if (to + 1 < r.degC.size())
       bends += std::abs(r.degC[from] + slope(to) * run_s(to + 1) - r.degC[to + 1]) > 3 * tolerance_K;
@@ -105,14 +111,14 @@ std::vector<std::size_t> joined_by_lines(const Readings& r, double step_K) {
     if (is_multiple(l, k) && l < 1.5 * k) alike += l;
   }
   const bool bend = bends > 0.8 * static_cast<double>(lengths.size());
-  return on_lines > 0.8 * rows && (bend || alike > 0.8 * rows) ? kept : std::vector<std::size_t>{};
+  return on_lines > 0.8 * rows && (bend || alike > 0.8 * rows) ? lines : std::vector<Line>{};
 }
 
 /// The column with nothing but these of its readings; as it is where there are none.
 std::vector<double> only(const std::vector<double>& column, const Readings& r, const std::vector<std::size_t>& kept) {
   if (kept.empty()) return column;
   std::vector<double> out(column.size(), missing);
-  for (const std::size_t i : kept) out[r.row[i]] = column[r.row[i]];
+  for (const std::size_t i : kept) out[r.row[i]] = r.degC[i];
   return out;
 }
 
@@ -125,7 +131,27 @@ std::vector<double> without_repeats(const Log& log, Role role) {
 
 std::vector<double> without_lines(const Log& log, Role role) {
   const Readings r = readings_of(log, role);
-  return only(log.of(role), r, joined_by_lines(r, step_of(log.of(role))));
+  Readings read = r;
+  const std::vector<Line> lines = lines_of(r, step_of(log.of(role)));
+  std::vector<std::size_t> kept;
+  if (!lines.empty()) kept.push_back(0);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const auto [from, to] = lines[i];
+    const bool between =
+        !lines[i].joins() && i > 0 && i + 1 < lines.size() && lines[i - 1].joins() && lines[i + 1].joins();
+    if (!between) {
+      kept.push_back(to);
+      continue;
+    }
+    // What was read between two rows lies where the lines cross; it is put into the nearer one.
+    const auto slope = [&](const Line& l) { return (r.degC[l.to] - r.degC[l.from]) / (r.t_s[l.to] - r.t_s[l.from]); };
+    const double before = slope(lines[i - 1]), after = slope(lines[i + 1]), apart_s = r.t_s[to] - r.t_s[from];
+    const double at_s = std::clamp((r.degC[to] - r.degC[from] - after * apart_s) / (before - after), 0.0, apart_s);
+    const double degC = r.degC[from] + before * at_s;
+    if (2 * at_s > apart_s) kept.back() = to;
+    read.degC[kept.back()] = degC;
+  }
+  return only(log.of(role), read, kept);
 }
 
 void forget_filled(Log& log) {

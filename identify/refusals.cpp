@@ -29,8 +29,8 @@ bool far_too_slow(const Problem& problem, const Fit& f) {
 }
 
 /// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
-/// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor; what a
-/// housing is mounted on, no sheet knows.
+/// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
+/// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
 std::string unlike_the_motor(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
   const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
@@ -42,10 +42,14 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
   }
   if (!problem.belief.known) return "";
   const auto lines = base_lines(problem, found.chosen.fit, 1);
-  for (const ParameterLine& line : {lines[0], lines[2]}) {
-    if (line.at_bound)
+  const Physical p = physical(found.chosen.fit.x);
+  const bool off[] = {true, p.R2_K_per_W > problem.belief.R2_K_per_W, true, p.C2_J_per_K < problem.belief.C2_J_per_K};
+  for (std::size_t i = 0; i < std::size(off); ++i) {
+    const ParameterLine& line = lines[i];
+    if (off[i] && line.at_bound)
       return fmt::format(
-          "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, or leave --motor away.",
+          "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, current_A its own current, "
+          "core_degC and housing_degC two sensors; or leave --motor away.",
           line.name, line.value, line.unit, problem.belief.motor);
   }
   return "";
