@@ -325,10 +325,11 @@ void read_resistance(Log& log) {
   ohm.clear();
   const double per_ohm = (1 + per_K * (start_degC - at_degC)) / start_ohm;
   for (double& x : log.of(Role::core)) x = at_degC + (per_ohm * x - 1) / per_K;
-  log.notes.push_back(
-      fmt::format("winding_ohm is read as core_degC by copper's 0.393 %/K, from {:.4g} ohm at {:.1f} degC at the "
-                  "start ({} reading{}), where all of the motor is taken to be as warm as its housing.",
-                  start_ohm, start_degC, readings_ohm.size(), readings_ohm.size() == 1 ? "" : "s"));
+  log.notes.push_back(fmt::format(
+      "winding_ohm is read as core_degC by copper's 0.393 %/K, from {:.4g} ohm at {:.1f} degC at the "
+      "start ({} reading{}), where all of the motor is taken to be as warm as its housing; leads in it that "
+      "stay cool look like a gain of the housing's sensor.",
+      start_ohm, start_degC, readings_ohm.size(), readings_ohm.size() == 1 ? "" : "s"));
 }
 
 /// Columns that are read and checked, and that nothing comes of.

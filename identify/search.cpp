@@ -277,6 +277,19 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
     out.singles[i].tied = likelier[i] > std::max(margins.likelier, most - margins.tie);
 }
 
+/// The first parameter of the causes that its bound holds; empty when none does. Nothing at all may well be true, and
+/// of a share all.
+std::string at_a_bound(const Fit& f) {
+  std::size_t at = base_count;
+  for (const Chosen& chosen : f.chosen) {
+    for (const Parameter& p : cause_of(chosen).parameters) {
+      const bool natural = std::string_view(p.name) == "share" || (p.low == 0 && !(f.x[static_cast<int>(at)] > 0));
+      if (f.at_bound[at++] && !natural) return p.name;
+    }
+  }
+  return "";
+}
+
 /// A board runs the model alone, on other loads: what is handed on is fitted with some leeway for load where R1 is not
 /// plain as well, to the noise that was judged by and no closer than such a model can be right. The leeway for lateness
 /// and frame stays: without it C1 of whole boards came out 7 percent too small in the median with standard errors of 3
@@ -380,6 +393,14 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
       out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
   }
   refit_for_the_board(judged, margins, out);
+  const std::string beyond = at_a_bound(out.chosen.fit);
+  if (!beyond.empty() && (out.verdict == Verdict::explained || out.verdict == Verdict::partly_explained)) {
+    out.verdict = Verdict::unknown_cause;
+    out.steps.push_back(
+        fmt::format("Yet the {} in {} would have to lie beyond its bound: none of the known causes "
+                    "explains this.",
+                    beyond, listed(out.chosen.fit.chosen)));
+  }
   return out;
 }
 
