@@ -57,7 +57,7 @@ struct Parameter {
   double none = 0;  // the value at which the cause does nothing
 };
 
-enum class Needs { nothing, current, speed, neighbour, frame, signed_current, several_logs, several_powers, copper };
+enum class Needs { nothing, current, speed, neighbour, frame, several_currents, several_logs, several_powers, copper };
 
 struct Cause {
   const char* id;

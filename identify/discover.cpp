@@ -140,7 +140,7 @@ std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
       // What needs a speed, and cannot be tried although it moves, needs a current as well.
       {problem.heated_by_power(),
        "power_W tells no current",
-       {moves ? Needs::speed : Needs::current, Needs::current, Needs::signed_current, Needs::copper}},
+       {moves ? Needs::speed : Needs::current, Needs::current, Needs::several_currents, Needs::copper}},
   };
   std::string out;
   for (const auto& gap : gaps) {

@@ -280,13 +280,13 @@ bool Problem::possible(const Cause& cause) const {
                           cause.edit == Edit::stall_share;
       return speed08_mean > 0 && (!loaded || amps);
     }
-    case Needs::signed_current: {
-      // With one sign alone an offset is a change of gain, and cannot be seen.
-      double plus = 0, minus = 0;
+    case Needs::several_currents: {
+      // Of one current alone an offset is a change of gain, and cannot be seen.
+      double n = 0, sum = 0, square = 0;
       for (const Bins& log : logs) {
-        for (const Bin& bin : log.bins) (bin.signed_A > 0 ? plus : minus) += bin.signed_A * bin.signed_A;
+        for (const Bin& bin : log.bins) n += 1, sum += bin.signed_A, square += bin.signed_A * bin.signed_A;
       }
-      return amps && std::min(plus, minus) > 0.02 * (plus + minus);
+      return amps && n * square > 1.1 * sum * sum;
     }
     case Needs::neighbour:
       return any([](const Bins& b) { return b.has_neighbour; });

@@ -393,6 +393,25 @@ TEST(Search, AnImitationThatWantsOtherParametersInEachPartOfTheLogIsNotNamed) {
   EXPECT_TRUE(names(identify::search(log.problem, blind)));
 }
 
+/// Told 0.4 A more than flows: before, heat that the current does not explain.
+TEST(Search, AnOffsetOfAMotorThatRunsOneWayIsFoundToo) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.current_A = [until = 30.0, now = 0.0](double t, std::mt19937_64& random) mutable {
+    std::uniform_real_distribution<double> uniform;
+    if (t >= until) now = uniform(random) < 0.3 ? 0 : 4 * uniform(random), until = t + 5 + 55 * uniform(random);
+    return now;
+  };
+  auto logs =
+      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_one_way.csv", options)), {}, std::nullopt);
+  for (double& i : logs[0].of(identify::Role::current)) i += 0.4;
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  const auto found = identify::search(identify::problem_of(logs, motor));
+  ASSERT_TRUE(names(found)) << found.steps.back();
+  EXPECT_EQ(found.tied.front(), std::vector<std::string>{"current_offset"});
+}
+
 TEST(Search, AStallHeatsByTheCurrentThatFlowsNotByTheOneThatWasRead) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   expect_named({.seed = 850041, .effects = {"current_offset", "stall_imbalance"}},
