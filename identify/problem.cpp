@@ -303,7 +303,6 @@ bool Problem::possible(const Cause& cause) const {
 Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
                    std::optional<double> copper_per_K) {
   Problem problem;
-  double finest_s = 1;
   if (motor) {
     const wire::Motor& m = motor->motor;
     Belief& b = problem.belief;
@@ -316,12 +315,6 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     b.C1_J_per_K = m.C1_J_per_K;
     b.C2_J_per_K = m.C2_J_per_K;
     b.winding_max_degC = m.winding_max_degC;
-    // From logs of 20 min without structure bins of half a time constant made C1 5 and 8 percent too small, of a
-    // quarter 1 and 2 (designed 5004, duty 5102). Of a long day half must do, for speed.
-    const double tau_s = m.R1_K_per_W * m.C1_J_per_K;
-    double longest_s = 0;
-    for (const Log& log : logs) longest_s = std::max(longest_s, log.of(Role::time).back());
-    finest_s = std::clamp(longest_s / most_fine_bins, tau_s / 4, tau_s / 2);
   }
   if (copper_per_K) problem.belief.copper_per_K = *copper_per_K;
   // A winding read all the time shows how its temperature bends within a bin.
@@ -330,7 +323,17 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     return std::count_if(core.begin(), core.end(), [](double x) { return !std::isnan(x); }) >
            static_cast<std::ptrdiff_t>(core.size() / 2);
   });
-  if (dense) finest_s = std::min(finest_s, longest_bin_s) / 2;
+  double longest_s = 0;
+  for (const Log& log : logs) longest_s = std::max(longest_s, log.of(Role::time).back());
+  // From logs of 20 min without structure bins of half a time constant made C1 5 and 8 percent too small, of a
+  // quarter 1 and 2 (designed 5004, duty 5102). Of a long day half must do, for speed.
+  const auto fine_enough_s = [&](double winding_s) {
+    const double bin_s = std::clamp(longest_s / most_fine_bins, winding_s / 4, winding_s / 2);
+    return dense ? std::min(bin_s, longest_bin_s) / 2 : bin_s;
+  };
+  const double usual_winding_s = 4;  // until the log has shown its own
+  const auto winding_s = [&] { return problem.belief.R1_K_per_W * problem.belief.C1_J_per_K; };
+  double finest_s = fine_enough_s(motor ? winding_s() : usual_winding_s);
   const auto take_in = [&](double bin_s) {
     problem.logs.clear();
     for (const Log& log : logs) problem.logs.push_back(bins_of(log, bin_s));
@@ -346,7 +349,10 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
             "{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
             problem.logs.front().name));
   }
-  if (!motor) rough_search(problem);
+  if (!motor) {
+    rough_search(problem);
+    if (const double bin_s = fine_enough_s(winding_s()); bin_s < finest_s) take_in(finest_s = bin_s);
+  }
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
   if (!problem.heated_by_power()) warm_phases_unequally(problem);
   return problem;
