@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -134,6 +135,57 @@ void add_readings(Bins& out, const Log& log, Role role, double Bin::*value, floa
   }
 }
 
+/// White noise of one row's current, from stretches in which nothing turns and hardly anything flows; those in which it
+/// moves of itself do not count.
+double noise_at_rest_A(const Inputs& in) {
+  constexpr std::size_t rows = 20, least = 3;
+  constexpr double hardly = 0.25, still = 3;  // of the log's rms; of the middle one's square
+  const double most2 = hardly * hardly * square(in.amplitude_A) / static_cast<double>(in.amplitude_A.size());
+  std::vector<double> noise2;
+  for (std::size_t from = 0; from + rows <= in.amplitude_A.size(); from += rows) {
+    double sum2 = 0, second2 = 0, fastest = 0;
+    for (std::size_t k = from; k < from + rows; ++k) {
+      sum2 += in.amplitude_A[k] * in.amplitude_A[k];
+      fastest = std::max(fastest, std::abs(in.speed_rad_per_s[k]));
+      if (k >= from + 2) second2 += std::pow(in.amplitude_A[k] - 2 * in.amplitude_A[k - 1] + in.amplitude_A[k - 2], 2);
+    }
+    if (fastest < stalled_rad_per_s && sum2 <= rows * most2) noise2.push_back(second2 / (6 * (rows - 2)));
+  }
+  if (noise2.size() < least) return 0;
+  const double most = still * median(noise2);
+  double sum2 = 0, n = 0;
+  for (const double x : noise2) {
+    if (x <= most) sum2 += x, n += 1;
+  }
+  return std::sqrt(sum2 / n);
+}
+
+/// Where speed goes with the load it tells it too, and with less noise: heat that goes by speed would explain what the
+/// current alone does. Each bin's i^2 moves towards what speed says of it, as far as its own noise is part of what the
+/// two differ by. Returns how much of that noise is left.
+double told_by_speed_too(Bins& out) {
+  const double sigma2 = out.current_noise_A * out.current_noise_A, rows = out.width_s / out.interval_s;
+  double most_speed = 0;
+  for (const Bin& bin : out.bins) most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
+  constexpr int powers = 5;  // a fan's i^2 goes with the fourth power
+  const auto n = static_cast<Eigen::Index>(out.bins.size());
+  if (!(sigma2 > 0) || !(most_speed > 0) || n < 10 * powers) return 1;
+  Eigen::MatrixXd speed(n, powers);
+  Eigen::VectorXd A2(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const thermal::HeatInput<>& in = out.bins[static_cast<std::size_t>(k)].input;
+    for (int p = 0; p < powers; ++p) speed(k, p) = std::pow(in[Drive::speed_rad_per_s] / most_speed, p);
+    A2[k] = in[Drive::current_A2];
+  }
+  const Eigen::VectorXd said = speed * speed.colPivHouseholderQr().solve(A2);
+  const Eigen::ArrayXd noise = (4 * said.array().max(0) * sigma2 + 2 * sigma2 * sigma2) / rows;  // variance of i^2
+  const double else_ = std::max(0.0, ((A2 - said).array().square() - noise).mean());
+  const Eigen::ArrayXd share = noise / (noise + else_);
+  A2 -= (share * (A2 - said).array()).matrix();
+  for (Eigen::Index k = 0; k < n; ++k) out.bins[static_cast<std::size_t>(k)].input[Drive::current_A2] = A2[k];
+  return (noise * (1 - share)).mean() / noise.mean();
+}
+
 /// Bin::housing_ahead and core_ahead, means over the bin's readings. Inputs hold from one sample to the next, and none
 /// was read before the log began.
 void add_ahead(Bins& out, const Log& log, const Inputs& in) {
@@ -234,9 +286,10 @@ void find_idle(Bins& out) {
     most_heat = std::max(most_heat, heat(bin));
     most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
   }
-  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch.
+  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch; nor does its noise.
+  const double least_heat = std::max(1e-3 * most_heat, 4 * out.current_noise_A * out.current_noise_A);
   for (Bin& bin : out.bins)
-    bin.idle = heat(bin) <= 1e-3 * most_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
+    bin.idle = heat(bin) <= least_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
 }
 
 }  // namespace
@@ -292,6 +345,10 @@ Bins bins_of(const Log& log, double finest_s) {
   for (Bin& bin : out.bins) bin.housing_degC = bin.core_degC = missing;
   const Inputs in = inputs_of(log, out);
   add_inputs(out, log, usual_s, in);
+  out.current_noise_A = noise_at_rest_A(in);
+  // What rest shows flows, or is the sensor's: half of it is taken for heat, and fits average over the other (leeway).
+  for (Bin& bin : out.bins) bin.input[Drive::current_A2] -= 0.5 * out.current_noise_A * out.current_noise_A;
+  out.noisy_share = told_by_speed_too(out);
   if (!log.has(Role::speed)) {
     for (Bin& bin : out.bins) bin.stalled_A2 = 0;  // it may have turned
   }

@@ -48,8 +48,9 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
     disturbed.noise.disturbance_s = slow_s[i];
     Fit warm = undisturbed;
     double most = own;
-    for (double factor = 0.6; factor < 1000; factor *= 1.6) {
-      disturbed.noise.disturbance_K = factor * problem.noise.housing_slow_K;
+    const double least_K = std::max(0.6 * problem.noise.housing_slow_K, problem.noise.disturbance_K);
+    for (double factor = 1; factor < 1667; factor *= 1.6) {
+      disturbed.noise.disturbance_K = factor * least_K;
       Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
       if (f.x.size() == 0) break;
       const double reached = evidence(disturbed, f);

@@ -18,6 +18,8 @@ const double ordinary_uneven_share = 1 / std::sqrt(3.0);
 /// A frame on the housing: so much of its capacity, behind so much of its resistance to the sink. Assumed, as of
 /// host-sim's default motor: a standard deviation is one of these more or less.
 constexpr double ordinary_frame_share_of_C2 = 0.2, ordinary_frame_share_of_R2 = 0.02;
+/// Of what rest shows of the current's noise, flows all or nothing: of its square, this standard deviation.
+const double ordinary_ripple_share = 1 / std::sqrt(12.0);
 /// Of the heat, where the current squared is its mean over the heat: a standard deviation. The current that host-sim
 /// records says -0.5 to 0.4 percent more heat than the plant's joules, and down to -1.3 with load at top speed
 /// (designed, hidden motor 4110).
@@ -71,12 +73,20 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
   Problem uneven = problem;
   uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
-  Leeway lateness, frame, phases, moment;
+  Problem rippling = problem;
+  bool ripples = false;
+  for (Bins& log : rippling.logs) {
+    ripples = ripples || log.current_noise_A > 0;
+    for (Bin& bin : log.bins)
+      bin.input[thermal::Drive::current_A2] += ordinary_ripple_share * log.current_noise_A * log.current_noise_A;
+  }
+  Leeway lateness, frame, phases, moment, ripple;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
-                   warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l);
+                   warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l),
+                   heated = replayed(rippling, motor, l);
     const Replayed& at_once = sensor ? plain : even;
     const double moment_s = problem.logs[static_cast<std::size_t>(l)].interval_s * ordinary_moment_share;
     lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
@@ -87,10 +97,13 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
     phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
     phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
+    ripple.housing_K.push_back(apart_K(heated.housing_degC, even.housing_degC));
+    ripple.core_K.push_back(apart_K(heated.core_degC, even.core_degC));
   }
   std::vector<Leeway> out = {lateness, frame};
   if (problem.uneven_per_A2 > 0) out.push_back(phases);
   if (problem.noise.core_slow_K > 0) out.push_back(moment);
+  if (ripples && !problem.heated_by_power()) out.push_back(ripple);
   return out;
 }
 

@@ -223,6 +223,27 @@ void warm_phases_unequally(Problem& problem) {
   problem.warm_unevenly(b.copper_per_K * R_u_K_per_W * b.ohm / 6);
 }
 
+/// A current that is noisy from row to row tells a heat that is: white, of 2 i ohm times the current's. A housing
+/// gathers it as slowly as it cools, a winding on top as slowly as it follows.
+void allow_for_noisy_current(Problem& problem) {
+  const Belief& b = problem.belief;
+  double told2_s = 0, left2_s = 0, s = 0;
+  for (const Bins& log : problem.logs) {
+    const double noise2_s = log.current_noise_A * log.current_noise_A * log.interval_s * log.duration_s();
+    told2_s += noise2_s;
+    left2_s += log.noisy_share * noise2_s;
+    s += log.duration_s();
+  }
+  const auto gathered_K2 = [&](double noise2_s, double R_K_per_W, double C_J_per_K) {
+    return 4 * b.ohm * problem.heat_W * noise2_s / s * R_K_per_W / (2 * C_J_per_K);
+  };
+  Noise& noise = problem.noise;
+  noise.disturbance_K = std::sqrt(gathered_K2(left2_s, b.R2_K_per_W, b.C2_J_per_K));
+  noise.disturbance_s = std::clamp(b.R2_K_per_W * b.C2_J_per_K, 60.0, 240.0);
+  noise.of_current_K =
+      std::sqrt(gathered_K2(told2_s, b.R2_K_per_W, b.C2_J_per_K) + gathered_K2(told2_s, b.R1_K_per_W, b.C1_J_per_K));
+}
+
 }  // namespace
 
 bool Problem::any_core() const {
@@ -354,7 +375,10 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     if (const double bin_s = fine_enough_s(winding_s()); bin_s < finest_s) take_in(finest_s = bin_s);
   }
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
-  if (!problem.heated_by_power()) warm_phases_unequally(problem);
+  if (!problem.heated_by_power()) {
+    warm_phases_unequally(problem);
+    allow_for_noisy_current(problem);
+  }
   return problem;
 }
 

@@ -40,6 +40,7 @@ struct Noise {
   double core_white_K = 1, core_slow_K = 0;      // slow 0: read so rarely that all is white
   double disturbance_K = 0, disturbance_s = 60;  // of the housing; a winding that wanders more is disturbed more
   double idle_s = 0;                             // how much rest it was taken from; 0: assumed
+  double of_current_K = 0;                       // what the noise of the current moves a simulated winding, rms
 };
 
 /// What no motor is without and no cause is to be named for: how far its ordinary size moves the readings, for each log

@@ -75,7 +75,10 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
            std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(),
                        [](double w) { return std::abs(w) > 0; });
   });
-  if (turns && !problem.heated_by_power()) {
+  // Where speed tells the current, with less noise, the temperatures follow either.
+  const bool either =
+      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.noisy_share < 0.5; });
+  if (turns && !either && !problem.heated_by_power()) {
     std::vector<Log> swapped = logs;
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
     if (leaves_less(problem_of(swapped, motor), {}))

@@ -45,8 +45,9 @@ std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}",
 /// and 880).
 constexpr double doubted = 2;
 
-/// Why the best pair is not believed; empty when it is.
-std::string why_no_pair(const Problem& problem, const Field& field, const Margins& margins) {
+/// Why the best pair is not believed; empty when it is. `counted`: a slow disturbance counts as noise already, and is
+/// no rival any more.
+std::string why_no_pair(const Problem& problem, bool counted, const Field& field, const Margins& margins) {
   const Candidate& single = field.singles.front();
   const std::string first = listed(single.fit.chosen);
   if (field.pairs.empty()) return fmt::format("No further cause goes with {}.", first);
@@ -57,11 +58,11 @@ std::string why_no_pair(const Problem& problem, const Field& field, const Margin
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
   const double moved = moved_K(problem, pair.fit, single.fit);
-  if (moved < margins.noticeable_K)
+  if (moved < std::max(margins.noticeable_K, margins.of_current * problem.noise.of_current_K))
     return fmt::format(
         "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.", both, more,
         moved);
-  const double nameless = disturbance_of(problem, single.fit).gain;
+  const double nameless = counted ? 0 : disturbance_of(problem, single.fit).gain;
   if (!(more > nameless + margins.second))
     return fmt::format("{} would gain {:.1f} more than {}, a slow disturbance without a name {:.1f}: stopped there.",
                        both, more, first, nameless);
@@ -76,7 +77,7 @@ std::string why_no_pair(const Problem& problem, const Field& field, const Margin
   // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
   const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
   const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
-  if (more_K > 1.1 * fewer_K && disturbance_of(problem, pair.fit).gain > margins.remains)
+  if (!counted && more_K > 1.1 * fewer_K && disturbance_of(problem, pair.fit).gain > margins.remains)
     return fmt::format(
         "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
         more_K, first, fewer_K);
@@ -108,7 +109,8 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
 /// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
 bool noticeable(const Problem& problem, const Disturbance& d, const Margins& margins) {
   return d.gain > margins.remains &&
-         d.noise.disturbance_K > std::max(margins.disturbed_K, step_noise_share * coarsest_step_K(problem));
+         d.noise.disturbance_K > std::max({margins.disturbed_K, step_noise_share * coarsest_step_K(problem),
+                                           margins.of_current * problem.noise.of_current_K});
 }
 
 /// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
@@ -118,7 +120,9 @@ bool ends_without_a_name(const Problem& problem, const Field& field, const Distu
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
   const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
   const bool disturbed = noticeable(problem, without_causes, margins);
-  if (gain > margins.detect && (moves >= margins.worth_K || disturbed)) return false;
+  if (gain > margins.detect &&
+      (moves >= std::max(margins.worth_K, margins.of_current * problem.noise.of_current_K) || disturbed))
+    return false;
   out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
   out.steps.push_back(
       gain > margins.detect
@@ -156,15 +160,15 @@ Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>
 }
 
 /// One cause or two?
-void choose(const Problem& judged, const Margins& margins, Field field, Search& out) {
-  const std::string refusal = why_no_pair(judged, field, margins);
+void choose(const Problem& judged, bool counted, const Margins& margins, Field field, Search& out) {
+  const std::string refusal = why_no_pair(judged, counted, field, margins);
   const std::vector<Candidate> singles = field.singles;
   if (refusal.empty()) {
     const Candidate &pair = field.pairs.front(), &single = field.singles.front();
     out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.gain,
                                     pair.gain - single.gain, listed(single.fit.chosen)));
     out.sets = std::move(field.pairs);
-    if (judged.noise.disturbance_K > 0) add_neighbours(judged, field, out.sets);
+    if (counted) add_neighbours(judged, field, out.sets);
   } else {
     out.steps.push_back(refusal);
     out.sets = std::move(field.singles);
@@ -251,13 +255,15 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
 void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
-    const double behind = out.chosen.gain - c.gain;
-    if (c.chosen || behind >= reach) continue;
+    const double behind = out.chosen.gain - c.gain, of_current_K = margins.of_current * problem.noise.of_current_K;
+    if (c.chosen || (behind >= reach && of_current_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
-    if (behind >= margins.tie && out.tied.size() > 1 &&
-        moved_K(problem, out.chosen.fit, c.fit) > margins.left_apart * left.after_K)
-      continue;
+    if (behind >= margins.tie) {
+      const double apart_K = moved_K(problem, out.chosen.fit, c.fit);
+      const bool near = behind < reach && (out.tied.size() == 1 || apart_K <= margins.left_apart * left.after_K);
+      if (!near && !(apart_K < of_current_K)) continue;
+    }
     c.tied = true;
     out.tied.push_back(ids);
   }
@@ -354,7 +360,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   }
 
   const Problem judged = judged_by_what_remains(problem, all, margins, field, out);
-  choose(judged, margins, std::move(field), out);
+  choose(judged, judged.noise.disturbance_K > problem.noise.disturbance_K, margins, std::move(field), out);
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const double reach = left.complete ? margins.tie : margins.tie + left.gain;
   mark_ties(problem, left, reach, margins, out);

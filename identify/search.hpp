@@ -46,6 +46,10 @@ struct Margins {
   double small_part_unseen = 0.3;
   /// Sets that differ by less than this times what the best leaves are near it: a winding wanders twice as much.
   double left_apart = 2;
+  /// What the noise of the current moves, so many times, may be that: a cause must move more, and sets that differ by
+  /// less are tied. Two standard deviations: speed that goes with the current tells it with less noise, and explained
+  /// better what the current alone explains.
+  double of_current = 2;
   /// What a cause must move, rms, in the winding or at the sensor, to be worth a name: a thermistor's wander.
   double worth_K = 0.05;
   /// The same of a second cause: thrice that.

@@ -308,7 +308,11 @@ TEST(Search, ASensorOnTheStatorIsFoundAndTheBoardsSetPutsItThere) {
 TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto bin_s = [](const tests::HiddenLogOptions& o) {
-    return identify::problem_of(hidden(o).logs, std::nullopt).logs[0].width_s;  // a sheet would make them short at once
+    const Hidden log = hidden(o);
+    wire::pc::MotorFile slow;  // a sheet that is ten times off, or bins would be short at once
+    slow.motor = log.log.sheet;
+    slow.motor.C1_J_per_K *= 10;
+    return identify::problem_of(log.logs, slow).logs[0].width_s;
   };
   tests::HiddenLogOptions fast;  // an EC 16 whose winding follows within 0.9 s
   fast.seed = 17;
@@ -319,10 +323,22 @@ TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
   EXPECT_EQ(bin_s(fast), usual_s) << "a sensor that feels the load, and not within a bin";
 }
 
+TEST(Search, WithoutASheetNothingIsNamedOfAFastWindingThatHidesNothing) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // Windings of a second: in bins of a second a delay, a lag, an offset of the current were named.
+  const std::pair<std::uint64_t, tests::Core> logs[] = {
+      {2, tests::Core::dense}, {17, tests::Core::dense}, {17, tests::Core::sparse}};
+  for (const auto& [seed, core] : logs) {
+    const Hidden log = hidden({.duty = tests::Duty::designed, .core = core, .seed = seed});
+    const auto found = identify::search(identify::problem_of(log.logs, std::nullopt));
+    EXPECT_EQ(found.verdict, Verdict::adequate) << seed << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+  }
+}
+
 TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass) {
   const Hidden log = hidden({.duty = tests::Duty::designed,
                              .core = tests::Core::none,
-                             .seed = 2,
+                             .seed = 1,
                              .effects = {"sensor_placement"},
                              .strength = 2});
   const Problem blind = identify::problem_of(log.logs, {});
