@@ -160,30 +160,36 @@ double noise_at_rest_A(const Inputs& in) {
   return std::sqrt(sum2 / n);
 }
 
-/// Where speed goes with the load it tells it too, and with less noise: heat that goes by speed would explain what the
-/// current alone does. Each bin's i^2 moves towards what speed says of it, as far as its own noise is part of what the
-/// two differ by. Returns how much of that noise is left.
-double told_by_speed_too(Bins& out) {
-  const double sigma2 = out.current_noise_A * out.current_noise_A, rows = out.width_s / out.interval_s;
-  double most_speed = 0;
-  for (const Bin& bin : out.bins) most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
-  constexpr int powers = 5;  // a fan's i^2 goes with the fourth power
-  const auto n = static_cast<Eigen::Index>(out.bins.size());
-  if (!(sigma2 > 0) || !(most_speed > 0) || n < 10 * powers) return 1;
-  Eigen::MatrixXd speed(n, powers);
-  Eigen::VectorXd A2(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const thermal::HeatInput<>& in = out.bins[static_cast<std::size_t>(k)].input;
-    for (int p = 0; p < powers; ++p) speed(k, p) = std::pow(in[Drive::speed_rad_per_s] / most_speed, p);
-    A2[k] = in[Drive::current_A2];
+/// Where speed goes with the current it tells it too, and with less noise: heat that goes by speed would explain what
+/// the current alone does. Each row's current moves towards what a polynomial in speed says of it, as far as noise is
+/// part of what the two differ by; returns that share.
+double moved_towards_speed(Inputs& in, double noise_A) {
+  double fastest = 0;
+  for (const double w : in.speed_rad_per_s) fastest = std::max(fastest, std::abs(w));
+  if (!(noise_A > 0) || !(fastest > 0)) return 0;
+  using Powers = Eigen::Vector<double, 8>;  // to the third, of size and with sign
+  const auto powers = [&](std::size_t i) {
+    const double w = std::abs(in.speed_rad_per_s[i]) / fastest, sign = in.speed_rad_per_s[i] < 0 ? -1 : 1;
+    Powers p;
+    p << 1, w, w * w, w * w * w, sign, sign * w, sign * w * w, sign * w * w * w;
+    return p;
+  };
+  Eigen::Matrix<double, 8, 8> squares = Eigen::Matrix<double, 8, 8>::Zero();
+  Powers products = Powers::Zero();
+  for (std::size_t i = 0; i < in.amplitude_A.size(); ++i) {
+    const Powers p = powers(i);
+    squares += p * p.transpose();
+    products += p * in.amplitude_A[i];
   }
-  const Eigen::VectorXd said = speed * speed.colPivHouseholderQr().solve(A2);
-  const Eigen::ArrayXd noise = (4 * said.array().max(0) * sigma2 + 2 * sigma2 * sigma2) / rows;  // variance of i^2
-  const double else_ = std::max(0.0, ((A2 - said).array().square() - noise).mean());
-  const Eigen::ArrayXd share = noise / (noise + else_);
-  A2 -= (share * (A2 - said).array()).matrix();
-  for (Eigen::Index k = 0; k < n; ++k) out.bins[static_cast<std::size_t>(k)].input[Drive::current_A2] = A2[k];
-  return (noise * (1 - share)).mean() / noise.mean();
+  const Powers by_speed = squares.completeOrthogonalDecomposition().solve(products);
+  double apart2 = 0;
+  for (std::size_t i = 0; i < in.amplitude_A.size(); ++i)
+    apart2 += std::pow(in.amplitude_A[i] - by_speed.dot(powers(i)), 2) / static_cast<double>(in.amplitude_A.size());
+  const double share = std::min(1.0, noise_A * noise_A / apart2);
+  if (share < 0.5) return 0;
+  for (std::size_t i = 0; i < in.amplitude_A.size(); ++i)
+    in.amplitude_A[i] -= share * (in.amplitude_A[i] - by_speed.dot(powers(i)));
+  return share;
 }
 
 /// Bin::housing_ahead and core_ahead, means over the bin's readings. Inputs hold from one sample to the next, and none
@@ -343,12 +349,18 @@ Bins bins_of(const Log& log, double finest_s) {
   const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);
   out.bins.assign(std::max<std::size_t>(count, 1), Bin{});
   for (Bin& bin : out.bins) bin.housing_degC = bin.core_degC = missing;
-  const Inputs in = inputs_of(log, out);
-  add_inputs(out, log, usual_s, in);
+  Inputs in = inputs_of(log, out);
   out.current_noise_A = noise_at_rest_A(in);
+  const bool rippled = in.sampled_A != in.amplitude_A;
+  const double to_speed = moved_towards_speed(in, out.current_noise_A);
+  if (!rippled) in.sampled_A = in.amplitude_A;
+  out.noisy_share = 1 - to_speed;
+  add_inputs(out, log, usual_s, in);
   // What rest shows flows, or is the sensor's: half of it is taken for heat, and fits average over the other (leeway).
-  for (Bin& bin : out.bins) bin.input[Drive::current_A2] -= 0.5 * out.current_noise_A * out.current_noise_A;
-  out.noisy_share = told_by_speed_too(out);
+  // Of the square of a current that was moved, noise left less than nothing.
+  const double noise2_in_square = to_speed > 0 ? to_speed - 1 : 1;
+  for (Bin& bin : out.bins)
+    bin.input[Drive::current_A2] += (0.5 - noise2_in_square) * out.current_noise_A * out.current_noise_A;
   if (!log.has(Role::speed)) {
     for (Bin& bin : out.bins) bin.stalled_A2 = 0;  // it may have turned
   }

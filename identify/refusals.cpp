@@ -77,7 +77,7 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   });
   // Where speed tells the current, with less noise, the temperatures follow either.
   const bool either =
-      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.noisy_share < 0.5; });
+      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.noisy_share < 1; });
   if (turns && !either && !problem.heated_by_power()) {
     std::vector<Log> swapped = logs;
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));

@@ -335,6 +335,49 @@ TEST(Search, WithoutASheetNothingIsNamedOfAFastWindingThatHidesNothing) {
   }
 }
 
+/// A current as a chip reads it from the field it makes: noisy, a tenth of its rms. `fan`: speed goes with it.
+identify::Search of_a_noisy_current(const tests::HiddenLogOptions& o, bool fan) {
+  Hidden log = hidden(o);
+  auto &current = log.logs[0].of(identify::Role::current), &speed = log.logs[0].of(identify::Role::speed);
+  double mean2 = 0;
+  for (const double A : current) mean2 += A * A / static_cast<double>(current.size());
+  const double rms_A = std::sqrt(mean2);
+  std::mt19937_64 random(o.seed);
+  std::normal_distribution<double> noise(0, 0.1 * rms_A);
+  for (std::size_t k = 0; k < current.size(); ++k) {
+    if (fan) speed[k] = 300 * current[k] / rms_A;
+    current[k] += noise(random);
+  }
+  wire::pc::MotorFile sheet;
+  sheet.motor = log.log.sheet;
+  return identify::search(identify::problem_of(log.logs, sheet));
+}
+
+TEST(NoisyCurrent, IsNotTakenForWhatTheMotorDoes) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto steps = [](tests::HiddenLogOptions o, bool fan) {
+    o.core = tests::Core::dense;
+    const auto found = of_a_noisy_current(o, fan);
+    return found.verdict == Verdict::adequate ? "" : fmt::format("{}", fmt::join(found.steps, "\n"));
+  };
+  EXPECT_EQ(steps({.duty = tests::Duty::designed, .seed = 2}, false), "") << "the heat that noise makes up";
+  EXPECT_EQ(steps({.seed = 2}, true), "") << "what speed tells better than the current";
+  EXPECT_EQ(steps({.seed = 4}, true), "") << "the same; winding_eddy where only the current is believed";
+}
+
+TEST(NoisyCurrent, DoesNotMakeTheSpeedOfAFanTheOnlyCause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  for (const std::uint64_t seed : {1, 3}) {
+    const auto found =
+        of_a_noisy_current({.duty = tests::Duty::designed, .seed = seed, .effects = {"board_heat"}}, true);
+    EXPECT_EQ(found.verdict, Verdict::ambiguous);
+    const bool told = std::any_of(found.tied.begin(), found.tied.end(), [](const std::vector<std::string>& ids) {
+      return ids == std::vector<std::string>{"board_heat"};
+    });
+    EXPECT_TRUE(told) << seed << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+  }
+}
+
 TEST(Search, WithoutASheetAHousingThatAnswersAtOnceIsNotTakenForAMotorOfOneMass) {
   const Hidden log = hidden({.duty = tests::Duty::designed,
                              .core = tests::Core::none,
