@@ -130,6 +130,61 @@ bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vecto
   return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
 }
 
+/// As it was told last, and as it is told next, where that is not now.
+std::vector<double> told_last(std::vector<double> load) {
+  for (std::size_t i = 1; i < load.size(); ++i) {
+    if (std::isnan(load[i])) load[i] = load[i - 1];
+  }
+  return load;
+}
+std::vector<double> told_next(std::vector<double> load) {
+  for (std::size_t i = load.size(); i-- > 1;) {
+    if (std::isnan(load[i - 1])) load[i - 1] = load[i];
+  }
+  return load;
+}
+
+/// A row sooner than that.
+std::vector<double> told_sooner(std::vector<double> load) {
+  load = told_next(std::move(load));
+  load.erase(load.begin());
+  load.push_back(load.back());
+  return load;
+}
+
+/// The same logs under a load that is `as` makes it of what was measured.
+Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double> (*as)(std::vector<double>)) {
+  for (Log& log : logs) {
+    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
+      if (log.has(role)) log.of(role) = as(without_lines(log, role));
+    }
+  }
+  return unseen_by(problem, logs);
+}
+
+/// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it.
+double left_open_K(const Problem& problem, const Fit& base, const std::vector<Log>& logs) {
+  const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
+                sooner = under(problem, logs, told_sooner);
+  double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
+    const auto run = [&](const Problem& p) { return replayed(p, base, static_cast<int>(l)).*of; };
+    const std::vector<double> line = run(problem), a = run(last), b = run(next), c = run(sooner);
+    for (std::size_t k = 0; k < line.size(); ++k) {
+      // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
+      const double less_K = (a[k] + b[k]) / 2 - line[k], rise_K = line[k] - line[0];
+      moved2 += (a[k] - c[k]) * (a[k] - c[k]);
+      less2 += less_K * less_K;
+      less_rise += less_K * rise_K;
+      rise2 += rise_K * rise_K;
+      ++bins;
+    }
+  }
+  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
+  return std::sqrt((moved2 / 12 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
+}
+
 }  // namespace
 
 std::string too_poor(const Problem& problem) {
@@ -194,62 +249,6 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
   return "";
 }
 
-std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
-  if (found.verdict != Verdict::unknown_cause) return "";
-  // The load as it was told last, and as it is told next, where that is not now.
-  std::vector<Log> last = logs, next = logs, sooner;
-  for (std::size_t l = 0; l < logs.size(); ++l) {
-    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
-      if (!logs[l].has(role)) continue;
-      std::vector<double>&before = last[l].of(role), &after = next[l].of(role);
-      before = after = without_lines(logs[l], role);
-      for (std::size_t i = 1; i < before.size(); ++i) {
-        if (std::isnan(before[i])) before[i] = before[i - 1];
-      }
-      for (std::size_t i = before.size(); i-- > 1;) {
-        if (std::isnan(after[i - 1])) after[i - 1] = after[i];
-      }
-    }
-  }
-  sooner = next;
-  for (Log& log : sooner) {
-    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
-      if (log.has(role)) log.of(role).erase(log.of(role).begin()), log.of(role).push_back(log.of(role).back());
-    }
-  }
-  const Problem as_last = unseen_by(problem, last), as_next = unseen_by(problem, next),
-                as_sooner = unseen_by(problem, sooner);
-  double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0, apart_s = 0;
-  for (std::size_t l = 0; l < logs.size(); ++l) {
-    const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
-    const auto run = [&](const Problem& p) { return replayed(p, found.base.fit, static_cast<int>(l)).*of; };
-    const std::vector<double> line = run(problem), a = run(as_last), b = run(as_next), c = run(as_sooner);
-    for (std::size_t k = 0; k < line.size(); ++k) {
-      // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
-      const double less_K = (a[k] + b[k]) / 2 - line[k], rise_K = line[k] - line[0];
-      moved2 += (a[k] - c[k]) * (a[k] - c[k]);
-      less2 += less_K * less_K;
-      less_rise += less_K * rise_K;
-      rise2 += rise_K * rise_K;
-      ++bins;
-    }
-    apart_s = std::max(apart_s, problem.logs[l].interval_s);
-  }
-  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
-  const double doubt_K = std::sqrt((moved2 / 12 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
-  const double left_K =
-      disturbance_of(problem, fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})).noise.disturbance_K;
-  // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
-  // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
-  constexpr double times = 2.5, worth_K = 0.02;
-  if (doubt_K < worth_K || left_K > times * doubt_K) return "";
-  return fmt::format(
-      "What no cause explains, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
-      "in cells that were not measured, and when exactly moves the {} by as much; record the current in every row and "
-      "more often.",
-      left_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding");
-}
-
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
@@ -283,6 +282,24 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
         p.C1_J_per_K / p.C2_J_per_K);
   }
   return unlike_the_motor(problem, found, logs);
+}
+
+std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+  if (found.verdict != Verdict::unknown_cause) return "";
+  const double open_K = left_open_K(problem, found.base.fit, logs);
+  const double left_K =
+      disturbance_of(problem, fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})).noise.disturbance_K;
+  // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
+  // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
+  constexpr double times = 2.5, worth_K = 0.02;
+  if (open_K < worth_K || left_K > times * open_K) return "";
+  double apart_s = 0;
+  for (const Bins& log : problem.logs) apart_s = std::max(apart_s, log.interval_s);
+  return fmt::format(
+      "What no cause explains, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
+      "in cells that were not measured, and when exactly moves the {} by as much; record the current in every row and "
+      "more often.",
+      left_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding");
 }
 
 }  // namespace identify
