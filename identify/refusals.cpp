@@ -18,6 +18,12 @@ constexpr const char* in_milliseconds =
     "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
     "time_s=COLUMN:ms.";
 
+/// Are R2 and C2 known from this data?
+bool determines_housing(const Problem& problem, const Fit& f) {
+  const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
+  return lines[1].determined && lines[3].determined;
+}
+
 /// A motor a thousand times as slow fits as well where no sheet says otherwise. A winding of 17 minutes in a housing of
 /// 28 hours is none: a traction machine of 50 kW warms through within minutes and settles within hours.
 bool far_too_slow(const Problem& problem, const Fit& f) {
@@ -35,8 +41,7 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
   const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
     const Physical p = physical(f->x);
-    const auto lines = base_lines(problem, *f, std::max(1.0, f->ratio()));
-    if (in_air && p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && lines[1].determined && lines[3].determined)
+    if (in_air && p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && determines_housing(problem, *f))
       return "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
              "--column time_s=COLUMN:min.";
   }
@@ -58,6 +63,16 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
 /// What a fit misses over what noise alone would leave.
 double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
 
+/// The logs with these columns read in this unit.
+std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::vector<Log> logs) {
+  for (Log& log : logs) {
+    for (const Role role : roles) {
+      for (double& x : log.of(role)) x = unit.factor * (x + unit.offset);
+    }
+  }
+  return logs;
+}
+
 /// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
@@ -69,6 +84,10 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
     const double left = excess(fit(read, chosen));
     return left + clearly < explained && left < 0.25 * as_it_stands;
+  };
+  const auto follows_better = [&](const std::vector<Log>& otherwise) {
+    const Problem read = problem_of(otherwise, motor);
+    return leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
     return log.has(Role::current) && log.has(Role::speed) &&
@@ -89,36 +108,24 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   const auto at_most = [&](Eigen::Index i, double believed) {
     return two.at_bound[static_cast<std::size_t>(i)] && std::exp(two.x[i]) > believed;
   };
-  if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K)) {
-    std::vector<Log> faster = logs;
-    for (Log& log : faster) {
-      for (double& t : log.of(Role::time)) t *= 1e-3;
-    }
-    const Problem read = problem_of(faster, motor);
-    if (leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen)) return in_milliseconds;
-  }
+  if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K) &&
+      follows_better(read_in(*unit_named("ms"), {Role::time}, logs)))
+    return in_milliseconds;
   // A column that is ever below 50 would be below 10 degC: no room where motors are measured.
   const auto may_be_fahrenheit = [&](Role role) {
     return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
       return log.has(role) && std::none_of(log.of(role).begin(), log.of(role).end(), [](double x) { return x < 50; });
     });
   };
-  const Unit degF = *unit_named("degF");
   const std::vector<Role> together[] = {{Role::housing}, {Role::core}, {Role::housing, Role::core}};
   for (const std::vector<Role>& roles : together) {
-    if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit)) continue;
-    std::vector<Log> converted = logs;
+    if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit) ||
+        !follows_better(read_in(*unit_named("degF"), roles, logs)))
+      continue;
     std::string columns;
-    for (const Role role : roles) {
-      columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
-      for (Log& log : converted) {
-        for (double& reading : log.of(role)) reading = degF.factor * (reading + degF.offset);
-      }
-    }
-    const Problem read = problem_of(converted, motor);
-    if (leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen))
-      return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
-                         columns);
+    for (const Role role : roles) columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
+    return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
+                       columns);
   }
   return "";
 }
@@ -218,29 +225,25 @@ std::string too_poor(const Problem& problem) {
 std::string too_short(const Problem& problem, const Fit& base, const Search& found) {
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
-  const auto time_constant_s = [&](const Fit& f) {
+  const auto time_constant_s = [](const Fit& f) {
     const Physical p = physical(f.x);
     return p.R2_K_per_W * p.C2_J_per_K;
-  };
-  const auto determines = [](const Problem& by, const Fit& f) {
-    const auto lines = base_lines(by, f, std::max(1.0, f.ratio()));
-    return lines[1].determined && lines[3].determined;
   };
   double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
   for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
     Problem one = problem;
     one.logs = {problem.logs[l]};
     const Fit alone = fit(one, {});
-    if (alone.x.size() > 0 && determines(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
+    if (alone.x.size() > 0 && determines_housing(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
   }
   // Two resistors that miss much may see no cooling, or a slow one, where the causes found let it be seen.
   const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
-  if (explains && determines(problem, found.chosen.fit))
+  if (explains && determines_housing(problem, found.chosen.fit))
     housing_s = std::min(housing_s, time_constant_s(found.chosen.fit));
   double all = 0;
   for (const Bins& log : problem.logs) all += log.duration_s();
   if (all < housing_s) {
-    const bool known = problem.belief.known || determines(problem, base);
+    const bool known = problem.belief.known || determines_housing(problem, base);
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
