@@ -77,10 +77,8 @@ struct Line {
 /// The lines that a channel follows from row to row. Empty where it does not: noise bends from row to row, and what is
 /// smooth bends little by little.
 std::vector<Line> lines_of(const Readings& r, double step_K) {
-  double most = 0;
-  for (const double x : r.degC) most = std::max(most, std::abs(x));
   // A rounded cell is off by half a step, and so are the ends of its line; a cell of single precision by 1e-7.
-  const double tolerance_K = step_K > 0 ? 1.01 * step_K : 1e-6 * most;
+  const double tolerance_K = step_K > 0 ? 1.01 * step_K : 1e-6 * largest_magnitude(r.degC);
   std::vector<Line> lines;
   std::vector<double> lengths;  // of those that join, but for level ones, which any channel may have
   double bends = 0;             // at the ends of these, seen in the next row
@@ -159,18 +157,15 @@ void forget_filled(Log& log) {
     std::vector<double> (*read_of)(const Log&, Role);
     const char* how;
   } ways[] = {{without_repeats, "by repeating"}, {without_lines, "along straight lines"}};
-  const auto count = [](const std::vector<double>& v) {
-    return std::count_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
-  };
   for (const Role role : {Role::housing, Role::core}) {
     // Between a coarse sensor's steps nothing is read either (masks.hpp).
     if (!log.has(role) || step_of(log.of(role)) >= coarse_K) continue;
     for (const auto& way : ways) {
       std::vector<double> read = way.read_of(log, role);
-      if (count(read) == count(log.of(role))) continue;
+      if (count_told(read) == count_told(log.of(role))) continue;
       log.notes.push_back(fmt::format("{} was filled in {} between readings about {:.2g} s apart; only these are used.",
                                       own_name(role), way.how,
-                                      log.of(Role::time).back() / static_cast<double>(count(read))));
+                                      log.of(Role::time).back() / static_cast<double>(count_told(read))));
       log.of(role) = std::move(read);
     }
   }

@@ -120,14 +120,10 @@ void check_range(const Log& log, Role role, double low, double high, const std::
 
 double lowest(const std::vector<double>& v) {
   double low = missing;
-  for (const double x : v) low = std::isnan(low) || x < low ? (std::isnan(x) ? low : x) : low;
+  for (const double x : v) {
+    if (std::isnan(low) || x < low) low = x;
+  }
   return low;
-}
-
-double largest_magnitude(const std::vector<double>& v) {
-  double high = 0;
-  for (const double x : v) high = std::abs(x) > high ? std::abs(x) : high;
-  return high;
 }
 
 /// Units that a header did not tell: values that no motor shows.
@@ -284,7 +280,7 @@ std::size_t rows_at_rest(const Log& log) {
   };
   const std::size_t rows = log.of(Role::time).size();
   double most = 0;
-  for (std::size_t i = 0; i < rows; ++i) most = heat(i) > most ? heat(i) : most;
+  for (std::size_t i = 0; i < rows; ++i) most = std::max(most, heat(i));
   std::size_t rest = 0;
   while (rest < rows && heat(rest) <= 1e-3 * most) ++rest;  // what is not told is no rest
   return rest;
@@ -379,12 +375,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     const auto& from = table.columns[static_cast<std::size_t>(table.find(source.column))];
     auto& to = log.of(role);
     to.reserve(rows.size());
-    bool any = false;
-    for (const std::size_t r : rows) {
-      to.push_back(source.factor * (from[r] + source.offset));
-      any = any || !std::isnan(to.back());
-    }
-    if (!any) {
+    for (const std::size_t r : rows) to.push_back(source.factor * (from[r] + source.offset));
+    if (count_told(to) == 0) {
       to.clear();
       log.notes.push_back(
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
@@ -438,6 +430,13 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
 
 bool resumes(const Log& log, double after_s, double until_s) {
   return std::any_of(log.resumes_s.begin(), log.resumes_s.end(), [&](double s) { return s > after_s && s <= until_s; });
+}
+
+Role heat_of(const Log& log) {
+  for (const Role role : {Role::power, Role::current}) {
+    if (log.has(role)) return role;
+  }
+  return Role::iq;
 }
 
 double first_degC(const Log& log) {

@@ -85,6 +85,9 @@ struct Log {
 /// Does it go on, after a pause, between these times?
 bool resumes(const Log& log, double after_s, double until_s);
 
+/// What tells the heat: a power, else a current; iq of currents along two axes.
+Role heat_of(const Log& log);
+
 /// The housing's, or the winding's, first reading.
 double first_degC(const Log& log);
 

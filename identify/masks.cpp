@@ -15,10 +15,6 @@ namespace {
 using wire::pc::Exit;
 using wire::pc::UserError;
 
-std::size_t count_missing(const std::vector<double>& v) {
-  return static_cast<std::size_t>(std::count_if(v.begin(), v.end(), [](double x) { return std::isnan(x); }));
-}
-
 /// Share of readings that are missing from a channel which is otherwise sampled at every row. A channel written every
 /// n-th row (a sparse winding reading) is judged on its own grid.
 double holes(const std::vector<double>& v) {
@@ -79,7 +75,7 @@ void read_between_steps(Log& log, Role role) {
   std::vector<double>& v = log.of(role);
   const auto& t = log.of(Role::time);
   const double step_K = step_of(v);
-  if (step_K < coarse_K || 2 * count_missing(v) > v.size()) return;
+  if (step_K < coarse_K || 2 * count_told(v) < v.size()) return;
 
   struct Step {
     std::size_t first, last;
@@ -133,7 +129,7 @@ double missing_of_input(const Log& log, Role role) {
   }
   const double grid_s = median(spacing_s);
   const auto late = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) { return s > 1.5 * grid_s; });
-  const double of_rows = static_cast<double>(count_missing(v)) / static_cast<double>(v.size());
+  const double of_rows = static_cast<double>(v.size() - count_told(v)) / static_cast<double>(v.size());
   if (spacing_s.size() < 10 || 10 * static_cast<std::size_t>(late) > spacing_s.size()) return of_rows;
   const double of_time =
       1 - static_cast<double>(spacing_s.size() + 1) * grid_s / (t.back() - t.front() - pauses_s + grid_s);
@@ -142,10 +138,10 @@ double missing_of_input(const Log& log, Role role) {
 
 /// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
 void note_missing_input(Log& log) {
-  std::vector<Role> input = {Role::power};
-  if (!log.has(Role::power)) input = {log.has(Role::current) ? Role::current : Role::iq};
-  if (input.front() == Role::iq && log.has(Role::id)) input.push_back(Role::id);
-  if (log.has(Role::iq) && input.size() == 1 && input.front() == Role::iq)
+  std::vector<Role> input = {heat_of(log)};
+  if (input.front() == Role::iq && log.has(Role::id))
+    input.push_back(Role::id);
+  else if (input.front() == Role::iq)
     log.notes.push_back("id_A is missing; all current is taken to make torque.");
   for (const Role role : input) {
     const double share = missing_of_input(log, role);

@@ -18,14 +18,7 @@ constexpr double pause_s = 5, long_s = 600, pause_rows = 5;
 constexpr std::size_t most_pauses = 24;  // each costs two initial temperatures
 constexpr double most_share = 0.02;      // of the rows: more are a logger that writes now and then
 // Of a part, so that also what is held out of it leaves enough to be fitted.
-constexpr std::ptrdiff_t least_rows = 100, least_readings = 40;
-
-Role heat_of(const Log& log) {
-  for (const Role role : {Role::power, Role::current}) {
-    if (log.has(role)) return role;
-  }
-  return Role::iq;
-}
+constexpr std::size_t least_rows = 100, least_readings = 40;
 
 /// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps,
 /// or goes one way; a coarse one repeats itself.
@@ -50,20 +43,19 @@ void forget_frozen_input(Log& log) {
   const Role role = heat_of(log);
   std::vector<double>& v = log.of(role);
   const auto& t = log.of(Role::time);
-  double range = 0;
-  for (const double x : v) range = std::abs(x) > range ? std::abs(x) : range;
+  const double range = largest_magnitude(v);
   const auto frozen = frozen_runs(v);
   std::vector<double> elsewhere = v;
-  for (const auto& [from, to] : frozen)
-    std::fill(elsewhere.begin() + static_cast<std::ptrdiff_t>(from),
-              elsewhere.begin() + static_cast<std::ptrdiff_t>(to), missing);
+  for (const auto& [from, to] : frozen) {
+    for (std::size_t i = from; i < to; ++i) elsewhere[i] = missing;
+  }
   if (!is_noisy(elsewhere, range)) return;
   for (const auto& [from, to] : frozen) {
     const double stood_s = t[to - 1] - t[from];
     if (std::abs(v[from]) < 0.1 * range || stood_s < least_s) continue;
     log.notes.push_back(fmt::format("{} stood frozen at {:.4g} for {:.0f} s from {:.0f} s; what flowed is not known.",
                                     own_name(role), v[from], stood_s, t[from]));
-    std::fill(v.begin() + static_cast<std::ptrdiff_t>(from) + 1, v.begin() + static_cast<std::ptrdiff_t>(to), missing);
+    for (std::size_t i = from + 1; i < to; ++i) v[i] = missing;
   }
 }
 
@@ -82,7 +74,7 @@ Log part_of(const Log& log, std::size_t from, std::size_t to) {
     if (role == Role::ambient || role == Role::coolant || role == Role::frame || role == Role::neighbour) {
       for (std::size_t i = from; std::isnan(some.front()) && i-- > 0;) some.front() = all[i];
     }
-    if (std::all_of(some.begin(), some.end(), [](double x) { return std::isnan(x); })) some.clear();
+    if (count_told(some) == 0) some.clear();
   }
   for (double& time : part.of(Role::time)) time -= t[from];
   for (const double s : log.resumes_s) {
@@ -122,7 +114,7 @@ void take_out_pauses(Log& log) {
   if (told.size() < 2) return;
   std::vector<bool> keep(heat.size(), true);
   const auto drop = [&](std::size_t from, std::size_t to) {
-    std::fill(keep.begin() + static_cast<std::ptrdiff_t>(from), keep.begin() + static_cast<std::ptrdiff_t>(to), false);
+    for (std::size_t i = from; i < to; ++i) keep[i] = false;
   };
   std::string pauses;
   const auto say = [&](double from_s, double to_s) {
@@ -140,7 +132,7 @@ void take_out_pauses(Log& log) {
   for (std::vector<double>& column : log.columns) {
     std::size_t row = 0;
     std::erase_if(column, [&](double) { return !keep[row++]; });
-    if (std::all_of(column.begin(), column.end(), [](double x) { return std::isnan(x); })) column.clear();
+    if (count_told(column) == 0) column.clear();
   }
   const double first_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= first_s;
@@ -168,11 +160,8 @@ std::vector<Log> parts_between_pauses(Log log) {
   for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
     part.sink_degC = first_degC(log);
-    const auto read = [&](Role role) {
-      const auto& v = part.of(role);
-      return std::count_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
-    };
-    if (read(Role::time) >= least_rows && std::max(read(Role::housing), read(Role::core)) >= least_readings)
+    const std::size_t readings = std::max(count_told(part.of(Role::housing)), count_told(part.of(Role::core)));
+    if (to - from >= least_rows && readings >= least_readings)
       parts.push_back(std::move(part));
     else
       left_out_s += t[to - 1] - t[from];

@@ -30,10 +30,6 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-bool any(const std::vector<double>& v) {
-  return std::any_of(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
-}
-
 /// gnuplot writes <svg ...> after an XML prologue that has no place inside a page, and fixed ids (clip paths, symbols)
 /// that would collide between two pictures of one page.
 std::string inlined(const std::string& svg, std::size_t number) {
@@ -51,9 +47,8 @@ std::string inlined(const std::string& svg, std::size_t number) {
 std::string picture(const Report& r, std::size_t l) {
   const LogPlot& p = r.plots[l];
   const bool extended = !p.extended_housing.empty();
-  const bool sparse =
-      std::count_if(p.measured_core.begin(), p.measured_core.end(), [](double x) { return !std::isnan(x); }) * 4 <
-      static_cast<std::ptrdiff_t>(p.measured_core.size());
+  const bool winding = count_told(p.measured_core) > 0, housing = count_told(p.measured_housing) > 0;
+  const bool sparse = count_told(p.measured_core) * 4 < p.measured_core.size();
   wire::pc::Picture out;
   out.title = p.name;
   out.x_label = "time, s";
@@ -61,32 +56,35 @@ std::string picture(const Report& r, std::size_t l) {
   wire::pc::Panel temperatures{"temperature, °C", {}};
   wire::pc::Panel residual{"residual, K", {}};
   const std::string before = extended ? " (two resistors)" : "";
-  if (any(p.measured_core)) {
+  if (winding) {
     temperatures.curves.push_back({"winding measured", p.time_s, p.measured_core, "#d55e00", false, sparse});
     residual.curves.push_back({"winding" + before, p.time_s, p.residual_core, "#d55e00", extended, sparse});
   }
-  if (any(p.measured_core) || r.core_refusal.empty())
+  if (winding || r.core_refusal.empty())
     temperatures.curves.push_back({"winding simulated" + before, p.time_s, p.simulated_core, "#e69f00", true});
-  if (any(p.measured_housing)) {
+  if (housing) {
     temperatures.curves.push_back({"housing measured", p.time_s, p.measured_housing, "#0072b2"});
     residual.curves.push_back({"housing" + before, p.time_s, p.residual_housing, "#0072b2", extended});
   }
   temperatures.curves.push_back({"housing simulated" + before, p.time_s, p.simulated_housing, "#56b4e9", true});
   if (extended) {
-    if (any(p.measured_core) || r.core_refusal.empty())
+    if (winding || r.core_refusal.empty())
       temperatures.curves.push_back({"winding, extended", p.time_s, p.extended_core, "#009e73"});
-    std::vector<double> core(p.time_s.size()), housing(p.time_s.size());
-    for (std::size_t k = 0; k < core.size(); ++k)
-      core[k] = p.measured_core[k] - p.extended_core[k], housing[k] = p.measured_housing[k] - p.extended_housing[k];
-    if (any(p.measured_core))
-      residual.curves.push_back({"winding, extended", p.time_s, core, "#009e73", false, sparse});
-    if (any(p.measured_housing)) residual.curves.push_back({"housing, extended", p.time_s, housing, "#404040"});
+    const auto left = [](std::vector<double> measured, const std::vector<double>& simulated) {
+      for (std::size_t k = 0; k < measured.size(); ++k) measured[k] -= simulated[k];
+      return measured;
+    };
+    if (winding)
+      residual.curves.push_back(
+          {"winding, extended", p.time_s, left(p.measured_core, p.extended_core), "#009e73", false, sparse});
+    if (housing)
+      residual.curves.push_back(
+          {"housing, extended", p.time_s, left(p.measured_housing, p.extended_housing), "#404040"});
   }
   residual.levels.push_back({0, ""});
   for (const Wrong& w : r.structure.wrong) {
     if (static_cast<std::size_t>(w.log) != l) continue;
-    const bool winding = w.channel == "winding";
-    if (winding != any(p.measured_core)) continue;  // one channel's stretches: two layers of tint hide each other
+    if ((w.channel == "winding") != winding) continue;  // one channel's stretches: two layers of tint hide each other
     // A label is as wide as a tenth of the picture: on a narrower stretch it would run into its neighbour.
     const bool wide = w.to_s - w.from_s > 0.09 * p.time_s.back();
     residual.stretches.push_back(

@@ -176,6 +176,16 @@ bool widens(std::string_view rest) {
 
 }  // namespace
 
+std::size_t count_told(const std::vector<double>& cells) {
+  return static_cast<std::size_t>(std::count_if(cells.begin(), cells.end(), [](double x) { return !std::isnan(x); }));
+}
+
+double largest_magnitude(const std::vector<double>& cells) {
+  double most = 0;
+  for (const double x : cells) most = std::max(most, std::abs(x));
+  return most;
+}
+
 int Table::find(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   return at == names.end() ? -1 : static_cast<int>(at - names.begin());

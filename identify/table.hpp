@@ -17,6 +17,10 @@ namespace identify {
 
 inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
+/// How many cells are not missing; and the largest of these without its sign, 0 of none.
+std::size_t count_told(const std::vector<double>& cells);
+double largest_magnitude(const std::vector<double>& cells);
+
 struct Table {
   std::string file;
   std::vector<std::string> names;
