@@ -203,6 +203,80 @@ void note_gaps(Log& log) {
   log.missing_share = std::max(log.missing_share, rows_lost);
 }
 
+/// Rows of readings, up to three in a row, that jump away and back as no temperature can.
+std::vector<std::size_t> temperature_glitches(const Log& log, Role role) {
+  constexpr double jump_K = 10;  // and back; beyond any thermistor's noise
+  constexpr std::size_t most = 3;
+  // Nothing that warms by so much is back within these times: a winding cools in 1 s and more, a housing in minutes.
+  // Water and air may change as fast as a winding.
+  constexpr double fast_s = 2.5, housing_s = 60;
+  constexpr double back_share = 0.1;  // so near to where it came from
+  const auto &v = log.of(role), &t = log.of(Role::time);
+  const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
+  std::vector<std::size_t> read;
+  std::vector<double> early;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::isnan(v[i])) continue;
+    read.push_back(i);
+    if (early.size() < 5) early.push_back(v[i]);
+  }
+  const bool motor = role == Role::core || role == Role::housing;
+  const double first_degC = median(early);
+  const double within_s = role == Role::housing ? housing_s : fast_s;
+  // Readings k to m-1, away from number `from`, with number `to` as near to it as before?
+  const auto glitch = [&](std::size_t k, std::size_t m, std::size_t from, std::size_t to) {
+    const std::size_t first = std::min({read[k], read[from], read[to]}), last = std::max(read[m - 1], read[to]);
+    double away_K = 1e300;
+    // Than all around and than itself at first, before and after, which no load makes a motor.
+    const auto cold = [&](std::size_t i) { return v[read[i]] < std::min(sink[read[i]], first_degC) - jump_K; };
+    bool colder = motor && !sink.empty() && !cold(from) && !cold(to);
+    for (std::size_t i = k; i < m; ++i) {
+      const double change_K = v[read[i]] - v[read[from]];
+      away_K = std::min(away_K, std::abs(change_K));
+      colder = colder && change_K < 0 && cold(i);
+    }
+    if (away_K < jump_K) return false;
+    if (colder && v[read[to]] > v[read[k]] + jump_K) return true;
+    // On its way up already: a peak.
+    if (from > 0 && from < k && std::abs(v[read[from]] - v[read[from - 1]]) > back_share * away_K) return false;
+    return t[last] - t[first] <= within_s && std::abs(v[read[to]] - v[read[from]]) < back_share * away_K;
+  };
+  std::vector<std::size_t> glitches;
+  for (std::size_t k = 0; k < read.size(); ++k) {
+    for (std::size_t m = k + 1; m <= std::min(k + most, read.size()); ++m) {
+      const std::size_t left = read.size() - m;
+      const bool is_glitch = k > 0 && left > 0 ? glitch(k, m, k - 1, m)
+                             : left > 1        ? glitch(k, m, m, m + 1)
+                                               : k > 1 && glitch(k, m, k - 1, k - 2);
+      if (!is_glitch) continue;
+      for (std::size_t i = k; i < m; ++i) glitches.push_back(read[i]);
+      read.erase(read.begin() + static_cast<std::ptrdiff_t>(k), read.begin() + static_cast<std::ptrdiff_t>(m));
+      --k;
+      break;
+    }
+  }
+  return glitches;
+}
+
+/// Rows that say more than so many times what ever lasts for two: an overload of one row is a load, and comes again; a
+/// hundred times the heat of what lasts is none. None where they are many.
+std::vector<std::size_t> load_glitches(const Log& log, Role role, double times) {
+  constexpr double most_share = 0.01;
+  const std::vector<double>& v = log.of(role);
+  double lasting = 0, before = 0;
+  for (const double x : v) {
+    if (std::isnan(x)) continue;
+    lasting = std::max(lasting, std::min(std::abs(x), std::abs(before)));
+    before = x;
+  }
+  std::vector<std::size_t> glitches;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (lasting > 0 && std::abs(v[i]) > times * lasting) glitches.push_back(i);
+  }
+  if (static_cast<double>(glitches.size()) > most_share * static_cast<double>(count_told(v))) glitches.clear();
+  return glitches;
+}
+
 }  // namespace
 
 double step_of(const std::vector<double>& v) {
@@ -263,87 +337,21 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
 }
 
 void forget_glitches(Log& log) {
-  constexpr double jump_K = 10;  // and back; beyond any thermistor's noise
-  constexpr std::size_t most = 3;
-  // Nothing that warms by so much is back within these times: a winding cools in 1 s and more, a housing in minutes.
-  // Water and air may change as fast as a winding.
-  constexpr double fast_s = 2.5, housing_s = 60;
-  constexpr double back_share = 0.1;  // so near to where it came from
-  const auto& t = log.of(Role::time);
-  const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
+  const auto forget = [&](Role role, const std::vector<std::size_t>& rows, const std::string& because, const char* one,
+                          const char* several) {
+    if (rows.empty()) return;
+    for (const std::size_t i : rows) log.of(role)[i] = missing;
+    log.notes.push_back(fmt::format("{} {} {} {} masked, the first at {:.1f} s.", own_name(role), because, rows.size(),
+                                    rows.size() == 1 ? one : several, log.of(Role::time)[rows.front()]));
+  };
   for (const Role role :
        {Role::coolant, Role::ambient, Role::core, Role::housing, Role::frame, Role::neighbour, Role::board}) {
-    std::vector<double>& v = log.of(role);
-    std::vector<std::size_t> read;
-    for (std::size_t i = 0; i < v.size(); ++i) {
-      if (!std::isnan(v[i])) read.push_back(i);
-    }
-    const bool motor = role == Role::core || role == Role::housing;
-    std::vector<double> early;
-    for (std::size_t k = 0; k < std::min<std::size_t>(5, read.size()); ++k) early.push_back(v[read[k]]);
-    const double first_degC = median(early);
-    const double within_s = role == Role::housing ? housing_s : fast_s;
-    /// Readings k to m-1, away from number `from`, with number `to` as near to it as before?
-    const auto glitch = [&](std::size_t k, std::size_t m, std::size_t from, std::size_t to) {
-      const std::size_t first = std::min({read[k], read[from], read[to]}), last = std::max(read[m - 1], read[to]);
-      double away_K = 1e300;
-      // Than all around and than itself at first, before and after, which no load makes a motor.
-      const auto cold = [&](std::size_t i) { return v[read[i]] < std::min(sink[read[i]], first_degC) - jump_K; };
-      bool colder = motor && !sink.empty() && !cold(from) && !cold(to);
-      for (std::size_t i = k; i < m; ++i) {
-        const double change_K = v[read[i]] - v[read[from]];
-        away_K = std::min(away_K, std::abs(change_K));
-        colder = colder && change_K < 0 && cold(i);
-      }
-      if (away_K < jump_K) return false;
-      if (colder && v[read[to]] > v[read[k]] + jump_K) return true;
-      // On its way up already: a peak.
-      if (from > 0 && from < k && std::abs(v[read[from]] - v[read[from - 1]]) > back_share * away_K) return false;
-      return t[last] - t[first] <= within_s && std::abs(v[read[to]] - v[read[from]]) < back_share * away_K;
-    };
-    std::vector<std::size_t> glitches;
-    for (std::size_t k = 0; k < read.size(); ++k) {
-      for (std::size_t m = k + 1; m <= std::min(k + most, read.size()); ++m) {
-        const std::size_t left = read.size() - m;
-        const bool is_glitch = k > 0 && left > 0 ? glitch(k, m, k - 1, m)
-                               : left > 1        ? glitch(k, m, m, m + 1)
-                                                 : k > 1 && glitch(k, m, k - 1, k - 2);
-        if (!is_glitch) continue;
-        for (std::size_t i = k; i < m; ++i) glitches.push_back(read[i]);
-        read.erase(read.begin() + static_cast<std::ptrdiff_t>(k), read.begin() + static_cast<std::ptrdiff_t>(m));
-        --k;
-        break;
-      }
-    }
-    for (const std::size_t i : glitches) v[i] = missing;
-    if (!glitches.empty())
-      log.notes.push_back(
-          fmt::format("{} jumps away and back as no temperature can: {} reading{} masked, the first at "
-                      "{:.1f} s.",
-                      own_name(role), glitches.size(), glitches.size() == 1 ? "" : "s", t[glitches.front()]));
+    forget(role, temperature_glitches(log, role), "jumps away and back as no temperature can:", "reading", "readings");
   }
-
-  // An overload of one row is a load, and comes again; a hundred times the heat of what ever lasts for two is none.
-  constexpr double many_times = 10, most_share = 0.01;
   for (const Role role : {Role::current, Role::id, Role::iq, Role::power}) {
-    std::vector<double>& v = log.of(role);
-    const double times = role == Role::power ? many_times * many_times : many_times;
-    double lasting = 0, before = missing;
-    std::size_t told = 0;
-    for (const double x : v) {
-      if (std::isnan(x)) continue;
-      if (told++ > 0) lasting = std::max(lasting, std::min(std::abs(x), std::abs(before)));
-      before = x;
-    }
-    std::vector<std::size_t> glitches;
-    for (std::size_t i = 0; i < v.size(); ++i) {
-      if (lasting > 0 && std::abs(v[i]) > times * lasting) glitches.push_back(i);
-    }
-    if (glitches.empty() || static_cast<double>(glitches.size()) > most_share * static_cast<double>(told)) continue;
-    for (const std::size_t i : glitches) v[i] = missing;
-    log.notes.push_back(fmt::format(
-        "{} exceeds {:g} times what it ever holds for two rows, in {} single row{}; masked, the first at {:.1f} s.",
-        own_name(role), times, glitches.size(), glitches.size() == 1 ? "" : "s", t[glitches.front()]));
+    const double times = role == Role::power ? 100 : 10;
+    forget(role, load_glitches(log, role, times),
+           fmt::format("exceeds {:g} times what it ever holds for two rows, in", times), "single row;", "single rows;");
   }
 }
 
