@@ -42,10 +42,12 @@ Role role_named(const std::string& name, const std::string& where) {
                                            fmt::join(own_names(), ", ")));
 }
 
-/// Where each role comes from: the map first, then own names of columns that the map does not give to another role. A
-/// header such as current_mA, whose stem is ours and whose unit is not, is a mistake worth a sentence rather than a
-/// silently ignored column.
-std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
+std::size_t index_of(const Table& table, const Source& source) {
+  return static_cast<std::size_t>(table.find(source.column));
+}
+
+/// The map, as far as the table bears it out.
+std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
   std::map<Role, Source> found;
   for (auto [role, source] : map.columns) {
     // "T:K" may be a name as a whole, and says the unit all the same.
@@ -64,14 +66,20 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
     }
     found[role] = source;
   }
+  return found;
+}
+
+/// Adds own names of columns that the map does not give to another role. A header such as current_mA, whose stem is
+/// ours and whose unit is not, is a mistake worth a sentence rather than a silently ignored column.
+void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Source>& found) {
   const auto mapped = [&](const std::string& header) {
     return std::any_of(map.columns.begin(), map.columns.end(),
                        [&](const auto& m) { return m.second.column == header; });
   };
   for (std::size_t r = 0; r < role_count; ++r) {
     const Role role = static_cast<Role>(r);
-    const std::string& name = own_names()[r];
-    if (found.count(role) != 0) continue;
+    const std::string& name = own_name(role);
+    if (found.contains(role)) continue;
     if (table.find(name) >= 0 && !mapped(name)) {
       found[role] = {name};
       continue;
@@ -79,7 +87,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
     const std::size_t cut = role == Role::neighbour ? name.rfind('_') : name.find('_');
     if (cut == std::string::npos) continue;
     for (const std::string& header : table.names) {
-      if (mapped(header) || header.rfind(name.substr(0, cut + 1), 0) != 0) continue;
+      if (mapped(header) || !header.starts_with(name.substr(0, cut + 1))) continue;
       const std::string unit = header.substr(cut + 1);
       if (const auto known = unit_named(unit); known && known->quantity == quantity_of(name.substr(cut + 1))) {
         throw UserError(
@@ -89,15 +97,21 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
       }
     }
   }
+}
+
+/// Where each role comes from, and in which unit.
+std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
+  std::map<Role, Source> found = from_map(table, map);
+  add_own_names(table, map, found);
   for (auto& [role, source] : found) {
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1) {
       throw UserError(Exit::unusable, fmt::format("{}: column '{}' stands there twice; rename or delete one of them.",
                                                   table.file, source.column));
     }
-    const std::string& complaint = table.complaints[static_cast<std::size_t>(table.find(source.column))];
+    const std::string& complaint = table.complaints[index_of(table, source)];
     if (!complaint.empty()) throw UserError(Exit::unusable, complaint);
     if (table.units.empty() || source.unit_said) continue;
-    std::string unit = table.units[static_cast<std::size_t>(table.find(source.column))];
+    std::string unit = table.units[index_of(table, source)];
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
     if (!unit.empty())
       apply_unit(unit, own_name(role),
@@ -357,7 +371,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
             const std::string& name) {
   Log log;
   log.name = name;
-  const auto& time = table.columns[static_cast<std::size_t>(table.find(found.at(Role::time).column))];
+  const std::size_t time_column = index_of(table, found.at(Role::time));
+  const auto& time = table.columns[time_column];
   std::vector<std::size_t> rows;
   for (const std::size_t r : chosen) {
     if (!std::isnan(time[r])) rows.push_back(r);
@@ -372,7 +387,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     log.notes.push_back(fmt::format("Rows that are the same as the row before were left out: {}.", repeated));
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
-    const auto& from = table.columns[static_cast<std::size_t>(table.find(source.column))];
+    const auto& from = table.columns[index_of(table, source)];
     auto& to = log.of(role);
     to.reserve(rows.size());
     for (const std::size_t r : rows) to.push_back(source.factor * (from[r] + source.offset));
@@ -387,7 +402,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
                                         ": the heat input (current_A, iq_A or power_W) has no value at all; record "
                                         "the log again.");
   }
-  if (table.of_day[static_cast<std::size_t>(table.find(found.at(Role::time).column))]) pass_midnights(log);
+  if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;
@@ -460,7 +475,7 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
                                                   fmt::join(table.names, ", ")));
     }
   };
-  const auto has = [&](Role r) { return found.count(r) != 0; };
+  const auto has = [&](Role r) { return found.contains(r); };
   need(has(Role::time), "a time column", "call it time_s or say --column time_s=NAME");
   need(has(Role::current) || has(Role::iq) || has(Role::power), "the heat input (current_A, iq_A or power_W)",
        "map it with --column current_A=NAME");
@@ -469,9 +484,10 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
 
   std::map<double, std::vector<std::size_t>> sessions;
   std::size_t in_a_session = 0;
-  const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
+  const std::vector<double>* session =
+      has(Role::session) ? &table.columns[index_of(table, found.at(Role::session))] : nullptr;
   for (std::size_t r = 0; r < table.rows(); ++r) {
-    const double key = session < 0 ? 0 : table.columns[static_cast<std::size_t>(session)][r];
+    const double key = session == nullptr ? 0 : (*session)[r];
     if (!std::isnan(key)) sessions[key].push_back(r), ++in_a_session;
   }
   if (sessions.empty()) {

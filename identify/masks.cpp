@@ -172,33 +172,33 @@ void note_missing_readings(Log& log) {
 
 void note_gaps(Log& log) {
   const auto& t = log.of(Role::time);
-  std::vector<double> spacing;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  const double usual = median(spacing);
+  std::vector<double> spacing_s;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing_s.push_back(t[i] - t[i - 1]);
+  const double usual_s = median(spacing_s);
   double lost_s = 0, held_s = 0;
   int gaps = 0;
-  for (std::size_t i = 0; i < spacing.size(); ++i) {
-    const double dt = spacing[i];
+  for (std::size_t i = 0; i < spacing_s.size(); ++i) {
+    const double dt_s = spacing_s[i];
     if (resumes(log, t[i], t[i + 1])) {
-      lost_s += dt - usual;
+      lost_s += dt_s - usual_s;
       continue;
     }
     // Five missed rows in a row are a gap; less is jitter. Two seconds are the longest bin, within which means are
     // formed.
-    if (dt > std::max(5 * usual, 2.0) && dt > 1.5 * usual) held_s += dt - usual, ++gaps;
+    if (dt_s > std::max(5 * usual_s, 2.0)) held_s += dt_s - usual_s, ++gaps;
   }
-  const double duration = t.back() - t.front();
-  log.gap_share = duration > 0 ? held_s / duration : 0;
+  const double duration_s = t.back() - t.front();
+  log.gap_share = duration_s > 0 ? held_s / duration_s : 0;
   if (gaps > 0) {
     log.notes.push_back(fmt::format("{} gap{} in time, {:.0f} s of {:.0f} s together; the input is held across {}.",
-                                    gaps, gaps == 1 ? "" : "s", held_s, duration, gaps == 1 ? "it" : "them"));
+                                    gaps, gaps == 1 ? "" : "s", held_s, duration_s, gaps == 1 ? "it" : "them"));
   }
   // Rows that are missing one by one among the others: the current that flowed in them is not known either.
   const double rows_lost =
-      duration > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual + lost_s + held_s) / duration : 0;
+      duration_s > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual_s + lost_s + held_s) / duration_s : 0;
   if (rows_lost > 0.1) {
-    log.notes.push_back(
-        fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).", 100 * rows_lost, usual));
+    log.notes.push_back(fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).",
+                                    100 * rows_lost, usual_s));
   }
   log.missing_share = std::max(log.missing_share, rows_lost);
 }
