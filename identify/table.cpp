@@ -174,6 +174,49 @@ bool widens(std::string_view rest) {
   return false;
 }
 
+std::string at_line(const Table& table, int line, const std::string& what) {
+  return fmt::format("{}, line {}: {}", table.file, line, what);
+}
+
+[[noreturn]] void refuse(const Table& table, int line, const std::string& what) {
+  throw UserError(Exit::unusable, at_line(table, line, what));
+}
+
+/// Names the columns: this row does, or, where it holds numbers, the '#' line before it. Was it the row?
+bool name_columns(Table& table, const std::vector<std::string_view>& row, std::string_view remark, char separator,
+                  int line) {
+  double value = missing;
+  const bool numbers = number(row.front(), separator == ';', value) && std::isfinite(value);
+  std::vector<std::string_view> header = row;
+  if (numbers &&
+      (!split(remark, separator, header) || header.size() != row.size() || !all_words(header, separator == ';'))) {
+    refuse(table, line,
+           "numbers where the header should be; put a line with column names (such as "
+           "time_s,current_A,housing_degC) first.");
+  }
+  while (header.size() > 1 && header.back().empty()) header.pop_back();
+  for (const auto name : header) table.names.emplace_back(trimmed(name));
+  table.columns.resize(header.size());
+  table.complaints.resize(header.size());
+  table.of_day.resize(header.size());
+  return !numbers;
+}
+
+void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    double value = missing, unused = 0;
+    if (!number(cells[c], decimal_comma, value) && table.complaints[c].empty()) {
+      table.complaints[c] =
+          at_line(table, line,
+                  fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
+                              shown(cells[c]), shown(table.names[c])));
+    }
+    table.columns[c].push_back(value);
+    if (time_of_day(cells[c], unused)) table.of_day[c] = true;
+  }
+  table.line.push_back(line);
+}
+
 }  // namespace
 
 std::size_t count_told(const std::vector<double>& cells) {
@@ -195,30 +238,25 @@ Table read_table(const std::string& path) {
   const std::string text = whole_file(path);
   Table table;
   table.file = path;
-  const auto at_line = [&](int line, const std::string& what) {
-    return fmt::format("{}, line {}: {}", path, line, what);
-  };
-  const auto refuse = [&](int line, const std::string& what) { throw UserError(Exit::unusable, at_line(line, what)); };
-
   std::string_view rest = text;
-  if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
-  if (rest.size() >= 2 && (rest.substr(0, 2) == "\xFF\xFE" || rest.substr(0, 2) == "\xFE\xFF")) {
-    refuse(1, "the file is UTF-16; save it as UTF-8 text.");
-  }
+  if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
+  if (rest.starts_with("\xFF\xFE") || rest.starts_with("\xFE\xFF"))
+    refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
   char separator = ',';
-  std::vector<std::string_view> cells, header;
+  std::vector<std::string_view> cells;
   std::string_view remark;  // the last '#' line: some programs write the header there
   for (int line = 1; !rest.empty(); ++line) {
     const std::size_t end = rest.find('\n');
     const bool closed = end != std::string_view::npos;
-    std::string_view row = rest.substr(0, end);
+    const std::string_view row = rest.substr(0, end);
     rest.remove_prefix(closed ? end + 1 : rest.size());
     if (row.size() > longest_line) {
-      refuse(line, fmt::format("{:.1f} MB without a line end; a table has one row a line: export the log again.",
-                               static_cast<double>(row.size()) / 1e6));
+      refuse(table, line,
+             fmt::format("{:.1f} MB without a line end; a table has one row a line: export the log again.",
+                         static_cast<double>(row.size()) / 1e6));
     }
     if (row.find('\0') != std::string_view::npos)
-      refuse(line, "a zero byte; this is not a text file: export the log as CSV.");
+      refuse(table, line, "a zero byte; this is not a text file: export the log as CSV.");
     const std::string_view bare = trimmed(row);  // not the row itself: a tab may stand for an empty cell
     if (bare.empty()) continue;
     if (bare.front() == '#') {
@@ -227,52 +265,24 @@ Table read_table(const std::string& path) {
     }
     if (table.names.empty()) {
       separator = separator_of(row);
-      if (!split(row, separator, cells)) refuse(line, "a quote is opened and never closed; repair the header.");
+      if (!split(row, separator, cells)) refuse(table, line, "a quote is opened and never closed; repair the header.");
       if (cells.size() < least_columns && widens(rest)) continue;  // what some loggers write before the table
-      double unused = 0;
-      const bool numbers = number(cells.front(), separator == ';', unused) && std::isfinite(unused);
-      header = cells;
-      if (numbers && (!split(remark, separator, header) || header.size() != cells.size() ||
-                      !all_words(header, separator == ';'))) {
-        refuse(line,
-               "numbers where the header should be; put a line with column names (such as "
-               "time_s,current_A,housing_degC) first.");
-      }
-      while (header.size() > 1 && header.back().empty()) header.pop_back();
-      for (const auto name : header) table.names.emplace_back(trimmed(name));
-      table.columns.resize(table.names.size());
-      table.complaints.resize(table.names.size());
-      table.of_day.resize(table.names.size());
-      if (!numbers) continue;
+      if (name_columns(table, cells, remark, separator, line)) continue;
     }
     // A separator at the end of every row is some loggers' habit; one cell too many and empty is not a mistake.
     const bool whole = split(row, separator, cells);
     if (whole && cells.size() == table.names.size() + 1 && cells.back().empty()) cells.pop_back();
     if (!whole || cells.size() != table.names.size()) {
-      refuse(line,
+      refuse(table, line,
              fmt::format(
                  "the row has {} of {} cells{}", cells.size(), table.names.size(),
                  closed ? "; repair or delete this line."
                         : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
     }
-    if (table.line.empty() && table.units.empty() && all_words(cells, separator == ';')) {
-      for (const auto unit : cells) table.units.emplace_back(unit);
-      continue;
-    }
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      double value = missing;
-      if (!number(cells[c], separator == ';', value)) {
-        std::string& complaint = table.complaints[c];
-        if (complaint.empty())
-          complaint =
-              at_line(line, fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
-                                        shown(cells[c]), shown(table.names[c])));
-      }
-      table.columns[c].push_back(value);
-      double unused = 0;
-      if (time_of_day(cells[c], unused)) table.of_day[c] = true;
-    }
-    table.line.push_back(line);
+    if (table.line.empty() && table.units.empty() && all_words(cells, separator == ';'))
+      table.units.assign(cells.begin(), cells.end());
+    else
+      add_row(table, cells, separator == ';', line);
   }
   if (table.names.empty()) {
     throw UserError(Exit::unusable, path + ": the file is empty; record a log with a header line and rows.");
