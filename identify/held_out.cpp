@@ -131,29 +131,30 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
 HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
                        const Fit& extended, Report& report) {
   HeldOut out;
+  Fit before, after;
+  const char* remark = " (not seen by the fit)";
   if (held.fraction > 0) {
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
-    const Fit before = carried_on(unseen, fitted, base), after = carried_on(unseen, fitted, extended);
+    remark = " (the last part, not seen by the fit)";
+    before = carried_on(unseen, fitted, base);
+    after = carried_on(unseen, fitted, extended);
     out.before = rmse_of(unseen, before);
-    out.after = rmse_of(unseen, after);
-    judge(unseen, before, after, held.draws, report, out);
-    add_plots(unseen, before, " (the last part, not seen by the fit)", report);
-    add_extended(unseen, after, report, report.plots.size() - unseen.logs.size());
-    return out;
+  } else {
+    const bool several = held.logs.size() > 1;
+    out.how = fmt::format("{}{}; initial temperatures from {} first readings", held.logs.front().name,
+                          several ? fmt::format(" and {} more", held.logs.size() - 1) : "", several ? "their" : "its");
+    for (const Log& log : held.logs) out.names.push_back(log.name);
+    // What is of one of the fitted logs (a fan) is not of these.
+    Fit elsewhere = extended;
+    for (Chosen& c : elsewhere.chosen) c.log = -1;
+    before = transferred(unseen, base);
+    after = transferred(unseen, elsewhere);
+    out.before = rmse_of(unseen, before, &out.each_before);
   }
-  out.how = fmt::format("{}{}; initial temperatures from {} first readings", held.logs.front().name,
-                        held.logs.size() > 1 ? fmt::format(" and {} more", held.logs.size() - 1) : "",
-                        held.logs.size() > 1 ? "their" : "its");
-  // What is of one of the fitted logs (a fan) is not of these.
-  Fit elsewhere = extended;
-  for (Chosen& c : elsewhere.chosen) c.log = -1;
-  const Fit before = transferred(unseen, base), after = transferred(unseen, elsewhere);
-  out.before = rmse_of(unseen, before, &out.each_before);
   out.after = rmse_of(unseen, after);
-  for (const Log& log : held.logs) out.names.push_back(log.name);
   judge(unseen, before, after, held.draws, report, out);
-  add_plots(unseen, before, " (not seen by the fit)", report);
-  add_extended(unseen, after, report, report.plots.size() - held.logs.size());
+  add_plots(unseen, before, remark, report);
+  add_extended(unseen, after, report, report.plots.size() - unseen.logs.size());
   return out;
 }
 
