@@ -2,6 +2,7 @@
 #include "identify/structure.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -65,6 +66,46 @@ double kolmogorov_tail(double x) {
   double p = 0;
   for (int j = 1; j <= 20; ++j) p += (j % 2 == 1 ? 2 : -2) * std::exp(-2.0 * j * j * x * x);
   return std::clamp(p, 0.0, 1.0);
+}
+
+/// Chance of such autocorrelations in white noise, by Ljung and Box. Of values whose mean is 0.
+double ljung_box_p(const std::vector<double>& v) {
+  const auto n = v.size();
+  double zero = 0, q = 0;
+  for (const double w : v) zero += w * w;
+  const std::size_t lags = std::min<std::size_t>(40, n / 5);
+  for (std::size_t j = 1; j <= lags; ++j) {
+    double r = 0;
+    for (std::size_t i = j; i < n; ++i) r += v[i] * v[i - j];
+    r /= zero;
+    q += r * r / static_cast<double>(n - j);
+  }
+  return chi2_tail(q * static_cast<double>(n) * static_cast<double>(n + 2), static_cast<double>(lags));
+}
+
+/// The same of the cumulated periodogram. Model errors are slow, so neighbouring values are averaged to 1024 at most.
+double periodogram_p(const std::vector<double>& v) {
+  const std::size_t group = (v.size() + 1023) / 1024, m = v.size() / group, half = (m - 1) / 2;
+  std::vector<double> g(m, 0.0), power;
+  for (std::size_t i = 0; i < m * group; ++i) g[i / group] += v[i];
+  double total = 0;
+  for (std::size_t f = 1; f <= half; ++f) {
+    const double w = 2 * std::numbers::pi * static_cast<double>(f) / static_cast<double>(m), turn = 2 * std::cos(w);
+    double s1 = 0, s2 = 0;
+    for (const double x : g) {
+      const double s = x + turn * s1 - s2;
+      s2 = s1;
+      s1 = s;
+    }
+    power.push_back(s1 * s1 + s2 * s2 - turn * s1 * s2);
+    total += power.back();
+  }
+  double sum = 0, most = 0;
+  for (std::size_t f = 0; f < half; ++f) {
+    sum += power[f];
+    most = std::max(most, std::abs(sum / total - static_cast<double>(f + 1) / static_cast<double>(half)));
+  }
+  return kolmogorov_tail(most * std::sqrt(static_cast<double>(half)));
 }
 
 /// What is unusual from bin `from` to `to`: the signal whose mean lies furthest from its mean in the rest of the log.
@@ -138,67 +179,33 @@ Whiteness whiteness(const std::vector<double>& whitened) {
   for (const double w : v) square += w * w, mean += w;
   out.ratio = std::sqrt(square / static_cast<double>(v.size()));
   mean /= static_cast<double>(v.size());
-
-  const auto n = v.size();
-  double zero = 0, q = 0;
-  for (const double w : v) zero += (w - mean) * (w - mean);
-  const std::size_t lags = std::min<std::size_t>(40, n / 5);
-  for (std::size_t j = 1; j <= lags; ++j) {
-    double r = 0;
-    for (std::size_t i = j; i < n; ++i) r += (v[i] - mean) * (v[i - j] - mean);
-    r /= zero;
-    q += r * r / static_cast<double>(n - j);
-  }
-  out.ljung_box_p = chi2_tail(q * static_cast<double>(n) * static_cast<double>(n + 2), static_cast<double>(lags));
-
-  // Cumulated periodogram. Model errors are slow, so neighbouring values are averaged to 1024 at most.
-  const std::size_t group = (n + 1023) / 1024, m = n / group, half = (m - 1) / 2;
-  std::vector<double> g(m, 0.0), power;
-  for (std::size_t i = 0; i < m * group; ++i) g[i / group] += v[i] - mean;
-  double total = 0;
-  for (std::size_t f = 1; f <= half; ++f) {
-    const double w = 2 * std::numbers::pi * static_cast<double>(f) / static_cast<double>(m), turn = 2 * std::cos(w);
-    double s1 = 0, s2 = 0;
-    for (const double x : g) {
-      const double s = x + turn * s1 - s2;
-      s2 = s1;
-      s1 = s;
-    }
-    power.push_back(s1 * s1 + s2 * s2 - turn * s1 * s2);
-    total += power.back();
-  }
-  double sum = 0, most = 0;
-  for (std::size_t f = 0; f < half; ++f) {
-    sum += power[f];
-    most = std::max(most, std::abs(sum / total - static_cast<double>(f + 1) / static_cast<double>(half)));
-  }
-  out.white_p = kolmogorov_tail(most * std::sqrt(static_cast<double>(half)));
+  for (double& w : v) w -= mean;
+  out.ljung_box_p = ljung_box_p(v);
+  out.white_p = periodogram_p(v);
   return out;
 }
 
 Structure structure(const Problem& problem, const Fit& f) {
   Structure out;
   const auto all = signals(problem);
-  std::vector<double> whitened, residual, core_residual;
-  std::vector<std::vector<double>> plain(all.size()), fast(all.size()), slow(all.size());
-  std::vector<double> rise;
+  constexpr double smoothed_s[] = {0, 30, 300};
+  std::vector<double> whitened, residual, rise;
+  std::vector<std::array<std::vector<double>, std::size(smoothed_s)>> values(all.size());
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
     const Replayed r = replayed(problem, f, static_cast<int>(l));
-    whitened.insert(whitened.end(), r.whitened.begin(), r.whitened.end());
-    const auto& seen = log.has_housing ? r.housing_residual_K : r.core_residual_K;
-    residual.insert(residual.end(), seen.begin(), seen.end());
+    append(whitened, r.whitened);
+    append(residual, log.has_housing ? r.housing_residual_K : r.core_residual_K);
     for (std::size_t k = 0; k < log.bins.size(); ++k)
       rise.push_back(r.housing_degC[k] - log.bins[k].input.boundary_degC[0]);
     for (std::size_t s = 0; s < all.size(); ++s) {
       std::vector<double> v;
       for (const Bin& b : log.bins) v.push_back(all[s].of(b));
-      const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
-        to.insert(to.end(), from.begin(), from.end());
-      };
-      append(plain[s], v);
-      append(fast[s], smoothed(v, log.width_s / (30 + log.width_s)));
-      append(slow[s], smoothed(v, log.width_s / (300 + log.width_s)));
+      for (std::size_t i = 0; i < std::size(smoothed_s); ++i)
+        append(values[s][i], smoothed_s[i] > 0 ? smoothed(v, log.width_s / (smoothed_s[i] + log.width_s)) : v);
     }
     const double slow_K = std::max(0.1, 3 * problem.noise.housing_slow_K);
     if (log.has_housing)
@@ -211,10 +218,9 @@ Structure structure(const Problem& problem, const Fit& f) {
   out.residual = whiteness(whitened);
   for (std::size_t s = 0; s < all.size(); ++s) {
     Relation best{all[s].name, 0, 0};
-    for (const auto& [values, tau] :
-         {std::pair(&plain[s], 0.0), std::pair(&fast[s], 30.0), std::pair(&slow[s], 300.0)}) {
-      const double c = correlation(residual, *values);
-      if (std::abs(c) > std::abs(best.correlation)) best = {all[s].name, c, tau};
+    for (std::size_t i = 0; i < std::size(smoothed_s); ++i) {
+      const double c = correlation(residual, values[s][i]);
+      if (std::abs(c) > std::abs(best.correlation)) best = {all[s].name, c, smoothed_s[i]};
     }
     out.relations.push_back(best);
   }
