@@ -126,16 +126,34 @@ void fill(Problem& trial, const Fit& truth) {
   }
 }
 
+/// Sets that an experiment is to tell apart, three at most.
+std::vector<const Candidate*> sets_to_separate(const Search& found) {
+  std::vector<const Candidate*> out;
+  for (const Candidate& c : found.sets) {
+    const bool picks_a_log =
+        std::any_of(c.fit.chosen.begin(), c.fit.chosen.end(), [](const Chosen& x) { return x.log >= 0; });
+    if ((c.chosen || c.tied) && !picks_a_log && out.size() < 3) out.push_back(&c);
+  }
+  return out;
+}
+
+/// How far the nearest rival stays from what any of them says of the trial, in squared noise units.
+double least_apart(Problem& trial, const std::vector<const Candidate*>& tied) {
+  double least = 1e300;
+  for (const Candidate* truth : tied) {
+    fill(trial, truth->fit);
+    for (const Candidate* rival : tied) {
+      if (rival != truth) least = std::min(least, 2 * fit(trial, rival->fit.chosen).misfit);
+    }
+  }
+  return least;
+}
+
 }  // namespace
 
 std::optional<Experiment> experiment(const Problem& problem, const Search& found, double most_A) {
   if (found.verdict != Verdict::ambiguous || problem.heated_by_power()) return std::nullopt;
-  std::vector<const Candidate*> tied;
-  for (const Candidate& c : found.sets) {
-    const bool picks_a_log =
-        std::any_of(c.fit.chosen.begin(), c.fit.chosen.end(), [](const Chosen& x) { return x.log >= 0; });
-    if ((c.chosen || c.tied) && !picks_a_log && tied.size() < 3) tied.push_back(&c);
-  }
+  const std::vector<const Candidate*> tied = sets_to_separate(found);
   if (tied.size() < 2) return std::nullopt;
   double top = 0;
   for (const Bins& log : problem.logs) {
@@ -150,7 +168,7 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     if (turns && top <= 0) continue;
     double largest = 0;
     for (const ProfileStep& step : protocol.steps) largest = std::max(largest, std::abs(step.current_A));
-    double least = 1e300, amps = std::min(problem.rms_A, most_A / largest);
+    double amps = std::min(problem.rms_A, most_A / largest);
     Problem trial = problem;
     trial.noise = found.noise;
     const auto stays_cool = [&](const Candidate* truth) {  // under every one of the models
@@ -164,16 +182,9 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
       if (!cool) amps *= weaker;
     }
     if (!cool) continue;
-    for (const Candidate* truth : tied) {
-      fill(trial, truth->fit);
-      for (const Candidate* rival : tied) {
-        if (rival == truth) continue;
-        const Fit f = fit(trial, rival->fit.chosen);
-        least = std::min(least, 2 * f.misfit);
-      }
-    }
-    if (least > best_D) {
-      best_D = least;
+    const double D = least_apart(trial, tied);
+    if (D > best_D) {
+      best_D = D;
       best.profile.clear();
       for (const ProfileStep& s : protocol.steps)
         best.profile.push_back({s.seconds, thermal::direct_A(s.current_A * amps), s.speed_rad_per_s * top});
