@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <map>
 #include <numbers>
-#include <vector>
 
 #include "identify/log.hpp"
 #include "identify/units.hpp"

@@ -96,7 +96,8 @@ class Plant {
 };
 
 struct Answers {
-  double continuous_A, burst_s, overshoot_K;  // amplitude
+  double continuous_A;  // amplitude
+  double burst_s, overshoot_K;
 };
 
 /// What a board that runs `believed` says and does. `burst_A` 0: not asked yet.
@@ -124,8 +125,7 @@ Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::Trus
   thermal::GovernorSettings limits;
   limits.max_A = static_cast<float>(burst_A);
   thermal::Governor governor(limits);
-  const double push_s = std::min(longest_push_s, std::isfinite(out.burst_s) ? 3 * out.burst_s + 30 : longest_push_s);
-  out.overshoot_K = 0;
+  const double push_s = std::min(longest_push_s, 3 * out.burst_s + 30);
   double allowed_A = static_cast<double>(governor.tick(core).current_A);
   for (double t_s = 0; t_s < push_s; t_s += estimator_dt_s) {
     const auto input = under(work, std::min(allowed_A, burst_A));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -90,20 +91,21 @@ std::string as_json(const Report& r) {
   }
   out["held_out"] = nullptr;
   if (r.held_out) {
-    out["held_out"] = {{"how", r.held_out->how},
-                       {"rmse_before_K", rms(r.held_out->before)},
-                       {"rmse_after_K", rms(r.held_out->after)},
-                       {"nearest", r.held_out->nearest},
-                       {"worst_before_K", number(worst(r.held_out->before))},
-                       {"worst_after_K", number(worst(r.held_out->after))},
-                       {"against", words(r.held_out->against)}};
-  }
-  if (r.held_out && r.held_out->before_95) {
-    const auto pair = [](const Interval& i) { return ordered_json::array({number(i.low), number(i.high)}); };
-    out["held_out"]["interval_95_K"] = {{"of", r.held_out->winding ? "core" : "housing"},
-                                        {"before", pair(*r.held_out->before_95)},
-                                        {"after", pair(*r.held_out->after_95)},
-                                        {"blocks", r.held_out->blocks}};
+    const HeldOut& h = *r.held_out;
+    out["held_out"] = {{"how", h.how},
+                       {"rmse_before_K", rms(h.before)},
+                       {"rmse_after_K", rms(h.after)},
+                       {"nearest", h.nearest},
+                       {"worst_before_K", number(worst(h.before))},
+                       {"worst_after_K", number(worst(h.after))},
+                       {"against", words(h.against)}};
+    if (h.before_95) {
+      const auto pair = [](const Interval& i) { return ordered_json::array({number(i.low), number(i.high)}); };
+      out["held_out"]["interval_95_K"] = {{"of", h.winding ? "core" : "housing"},
+                                          {"before", pair(*h.before_95)},
+                                          {"after", pair(*h.after_95)},
+                                          {"blocks", h.blocks}};
+    }
   }
   out["gain"] = nullptr;
   if (r.gain) {
