@@ -23,10 +23,6 @@ void judge_baseline(const Problem& problem, const Fit& fit, const std::vector<Lo
 /// Errors over all logs, K; `each`: of every log as well.
 Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
 
-/// Each log without its last `fraction`; and each whole, but with the readings of that part alone.
-Problem first_part(const Problem& problem, double fraction);
-Problem last_part(const Problem& problem, double fraction);
-
 /// Appends what was measured and what this fit simulates, log by log.
 void add_plots(const Problem& problem, const Fit& fit, const std::string& remark, Report& report);
 
