@@ -20,6 +20,8 @@ namespace {
 using wire::pc::Exit;
 using wire::pc::UserError;
 
+[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
+
 const std::array<std::string, role_count>& own_names() {
   static const std::array<std::string, role_count> names = {"time_s",       "current_A",
                                                             "id_A",         "iq_A",
@@ -89,12 +91,9 @@ void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Sour
     for (const std::string& header : table.names) {
       if (mapped(header) || !header.starts_with(name.substr(0, cut + 1))) continue;
       const std::string unit = header.substr(cut + 1);
-      if (const auto known = unit_named(unit); known && known->quantity == quantity_of(name.substr(cut + 1))) {
-        throw UserError(
-            Exit::unusable,
-            fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
-                        table.file, header, unit, name, name, header, unit));
-      }
+      if (const auto known = unit_named(unit); known && known->quantity == quantity_of(name.substr(cut + 1)))
+        refuse(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
+                           table.file, header, unit, name, name, header, unit));
     }
   }
 }
@@ -104,12 +103,11 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
   std::map<Role, Source> found = from_map(table, map);
   add_own_names(table, map, found);
   for (auto& [role, source] : found) {
-    if (std::count(table.names.begin(), table.names.end(), source.column) > 1) {
-      throw UserError(Exit::unusable, fmt::format("{}: column '{}' stands there twice; rename or delete one of them.",
-                                                  table.file, source.column));
-    }
+    if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
+      refuse(
+          fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
     const std::string& complaint = table.complaints[index_of(table, source)];
-    if (!complaint.empty()) throw UserError(Exit::unusable, complaint);
+    if (!complaint.empty()) refuse(complaint);
     if (table.units.empty() || source.unit_said) continue;
     std::string unit = table.units[index_of(table, source)];
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
@@ -124,19 +122,15 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
 
 void check_range(const Log& log, Role role, double low, double high, const std::string& unit) {
   for (const double v : log.of(role)) {
-    if (v < low || v > high) {
-      throw UserError(Exit::unusable,
-                      fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.",
-                                  log.name, own_name(role), v, low, high, unit));
-    }
+    if (v < low || v > high)
+      refuse(fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.", log.name,
+                         own_name(role), v, low, high, unit));
   }
 }
 
 double lowest(const std::vector<double>& v) {
   double low = missing;
-  for (const double x : v) {
-    if (std::isnan(low) || x < low) low = x;
-  }
+  for (const double x : v) low = std::fmin(low, x);  // which passes over what is missing
   return low;
 }
 
@@ -147,43 +141,36 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     if (!log.has(role)) continue;
     const double low = lowest(log.of(role));
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
-    if (low > 200) {
-      throw UserError(Exit::unusable,
-                      fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
-                                  log.name, own_name(role), low, own_name(role)));
-    }
+    if (low > 200)
+      refuse(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
+                         log.name, own_name(role), low, own_name(role)));
     // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
     // not.
-    if (role == Role::ambient && low > 55) {
-      throw UserError(Exit::unusable, fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like "
-                                                  "Fahrenheit; say --column ambient_degC=COLUMN:degF "
-                                                  "(and the same for the other temperatures).",
-                                                  log.name, low));
-    }
+    if (role == Role::ambient && low > 55)
+      refuse(
+          fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say --column "
+                      "ambient_degC=COLUMN:degF (and the same for the other temperatures).",
+                      log.name, low));
     check_range(log, role, -80, 600, "degC");
   }
   // Without anything that says how warm it is around the motor, a motor that is never cooler than a room can be is no
   // use, whatever its unit.
   const Role motor_at = log.has(Role::housing) ? Role::housing : Role::core;
-  if (!log.has(Role::ambient) && !log.has(Role::coolant) && lowest(log.of(motor_at)) > 55) {
-    throw UserError(
-        Exit::unusable,
+  if (!log.has(Role::ambient) && !log.has(Role::coolant) && lowest(log.of(motor_at)) > 55)
+    refuse(
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
                     "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
                     log.name, own_name(motor_at), lowest(log.of(motor_at))));
-  }
   // 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A
   // is beyond any board this project drives or any traction log it was shown.
   const double most_A = motor ? 40 * motor->rated_current_A : 1000;
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
-    if (peak > most_A) {
-      throw UserError(
-          Exit::unusable,
+    if (peak > most_A)
+      refuse(
           fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say --column "
                       "{1}=COLUMN:mA, if it is another quantity map the right column.",
                       log.name, own_name(role), peak, most_A));
-    }
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
 }
@@ -222,8 +209,7 @@ void check_order(const Log& log) {
   // the winding moves as much as it does, by chance a little more.
   constexpr double clearly = 1.3;
   if (pairs < 10 || !(housing2 > clearly * core2) || !(together < -0.35 * std::sqrt(over2 * heat2))) return;
-  throw UserError(
-      Exit::unusable,
+  refuse(
       fmt::format("{}: core_degC falls against housing_degC when the current rises, and moves less: the two "
                   "columns are swapped; map them with --column.",
                   log.name));
@@ -249,8 +235,8 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
                 "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
                 "the file there",
                 t[first - 1] - t[first] + median(spacing_s));
-  throw UserError(Exit::unusable, fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.",
-                                              table.file, table.line[rows[first]], t[first - 1], t[first], what_to_do));
+  refuse(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
+                     table.line[rows[first]], t[first - 1], t[first], what_to_do));
 }
 
 /// Takes rows away that say again, time and all, what the row before them says; how many.
@@ -307,9 +293,10 @@ void read_resistance(Log& log) {
   constexpr double soaked_K = 1;                   // two sensors beside each other differ by as much
   if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
   std::vector<double>& ohm = log.of(Role::winding_ohm);
-  const auto nothing = std::count_if(ohm.begin(), ohm.end(), [](double x) { return x <= 0; });
-  std::replace_if(
-      ohm.begin(), ohm.end(), [](double x) { return x <= 0; }, missing);
+  int nothing = 0;
+  for (double& x : ohm) {
+    if (x <= 0) x = missing, ++nothing;
+  }
   if (nothing > 0)
     log.notes.push_back(fmt::format("Cells of winding_ohm that say 0 or less are taken for no reading: {}.", nothing));
   const std::size_t rest = rows_at_rest(log);
@@ -377,10 +364,9 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   for (const std::size_t r : chosen) {
     if (!std::isnan(time[r])) rows.push_back(r);
   }
-  if (rows.size() * 3 < chosen.size() * 2 || rows.empty()) {
-    throw UserError(Exit::unusable, fmt::format("{}: {} of {} rows have no time; record the log again.", name,
-                                                chosen.size() - rows.size(), chosen.size()));
-  }
+  if (rows.size() * 3 < chosen.size() * 2 || rows.empty())
+    refuse(fmt::format("{}: {} of {} rows have no time; record the log again.", name, chosen.size() - rows.size(),
+                       chosen.size()));
   if (rows.size() < chosen.size())
     log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
   if (const std::size_t repeated = drop_repeated(rows, table, time); repeated > 0)
@@ -397,11 +383,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
-  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power)) {
-    throw UserError(Exit::unusable, name +
-                                        ": the heat input (current_A, iq_A or power_W) has no value at all; record "
-                                        "the log again.");
-  }
+  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power))
+    refuse(name + ": the heat input (current_A, iq_A or power_W) has no value at all; record the log again.");
   if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();
@@ -470,10 +453,9 @@ Log without_last(Log log, double fraction) {
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
   const auto found = resolve(table, map);
   const auto need = [&](bool there, const std::string& what, const std::string& hint) {
-    if (!there) {
-      throw UserError(Exit::unusable, fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
-                                                  fmt::join(table.names, ", ")));
-    }
+    if (!there)
+      refuse(fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
+                         fmt::join(table.names, ", ")));
   };
   const auto has = [&](Role r) { return found.contains(r); };
   need(has(Role::time), "a time column", "call it time_s or say --column time_s=NAME");
@@ -490,11 +472,9 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
     const double key = session == nullptr ? 0 : (*session)[r];
     if (!std::isnan(key)) sessions[key].push_back(r), ++in_a_session;
   }
-  if (sessions.empty()) {
-    throw UserError(Exit::unusable, fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it "
-                                                "or rename it.",
-                                                table.file, found.at(Role::session).column));
-  }
+  if (sessions.empty())
+    refuse(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
+                       table.file, found.at(Role::session).column));
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
     Log whole = one_log(table, found, rows,
