@@ -299,7 +299,8 @@ double step_of(const std::vector<double>& v) {
 
 std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<double>& values) {
   struct Run {
-    std::size_t from, to, readings;
+    std::size_t from, to;
+    double readings;
   };
   std::vector<Run> runs;
   std::vector<double> lengths, steps;
@@ -318,19 +319,18 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
   }
   std::vector<std::pair<std::size_t, std::size_t>> frozen;
   if (runs.size() < 10) return frozen;  // a typed constant, or a recording of nothing: no motion to compare with
-  for (const Run& run : runs) lengths.push_back(static_cast<double>(run.readings));
-  std::vector<double> sorted = lengths;
-  std::sort(sorted.begin(), sorted.end());
-  const double usual = sorted[sorted.size() * 9 / 10];
+  for (const Run& run : runs) lengths.push_back(run.readings);
+  std::sort(lengths.begin(), lengths.end());
+  const double usual = lengths[lengths.size() * 9 / 10];
   const double step = median(steps);
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (lengths[r] < std::max(6.0, 8 * usual)) continue;
+    if (runs[r].readings < std::max(6.0, 8 * usual)) continue;
     // A coarse channel rests at one step for long when nothing happens. It was frozen only if it then jumps by several.
     const bool fine = usual <= 2;
     const bool jumps = r + 1 < runs.size() && steps[r] > 4 * step;
     // Where a smooth channel turns round, it dwells on the values before and after as well, one step away.
     const bool turns = r > 0 && r + 1 < runs.size() && std::max(steps[r - 1], steps[r]) < 2 * step &&
-                       6 * std::max(lengths[r - 1], lengths[r + 1]) > lengths[r];
+                       6 * std::max(runs[r - 1].readings, runs[r + 1].readings) > runs[r].readings;
     if ((fine && !turns) || jumps) frozen.emplace_back(runs[r].from, runs[r].to);
   }
   return frozen;
