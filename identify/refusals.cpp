@@ -90,9 +90,7 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
     return leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
-    return log.has(Role::current) && log.has(Role::speed) &&
-           std::any_of(log.of(Role::speed).begin(), log.of(Role::speed).end(),
-                       [](double w) { return std::abs(w) > 0; });
+    return log.has(Role::current) && largest_magnitude(log.of(Role::speed)) > 0;
   });
   // Where speed tells the current, with less noise, the temperatures follow either.
   const bool either =
@@ -240,15 +238,15 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
   const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
   if (explains && determines_housing(problem, found.chosen.fit))
     housing_s = std::min(housing_s, time_constant_s(found.chosen.fit));
-  double all = 0;
-  for (const Bins& log : problem.logs) all += log.duration_s();
-  if (all < housing_s) {
+  double lasts_s = 0;
+  for (const Bins& log : problem.logs) lasts_s += log.duration_s();
+  if (lasts_s < housing_s) {
     const bool known = problem.belief.known || determines_housing(problem, base);
-    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", all,
+    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
   if (found.verdict == Verdict::adequate && !problem.belief.known && !base_lines(problem, base, 1)[1].determined)
-    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", all);
+    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
   return "";
 }
 
