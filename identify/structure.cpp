@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <numbers>
 
 namespace identify {
@@ -14,7 +13,7 @@ using thermal::Boundary, thermal::Drive;
 
 struct Signal {
   const char* name;
-  std::function<double(const Bin&)> of;
+  double (*of)(const Bin&);
 };
 
 std::vector<Signal> signals(const Problem& problem) {
