@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "identify/median.hpp"
@@ -50,9 +51,15 @@ double reading_noise(const std::vector<double>& v) {
     if (!std::isnan(x)) seen.push_back(x);
   }
   for (std::size_t i = 2; i < seen.size(); ++i) second.push_back(std::abs(seen[i] - 2 * seen[i - 1] + seen[i - 2]));
-  // Steps of the load are outliers here: clipped at five standard deviations, as the median tells them. A coarse
-  // channel repeats itself; its median is zero and nothing is clipped.
-  const double middle = median(second), most = middle > 0 ? 5 * middle / 0.6745 : 1e300;
+  // Steps of the load, and what a gap lies between, are outliers here: clipped at five standard deviations, as the
+  // median tells them. A coarse channel repeats itself; of it the median of what moves does.
+  double middle = median(second);
+  if (middle == 0) {
+    std::vector<double> moved;
+    std::copy_if(second.begin(), second.end(), std::back_inserter(moved), [](double d) { return d > 0; });
+    middle = moved.empty() ? 0 : median(moved);
+  }
+  const double most = 5 * middle / 0.6745;
   double sum = 0;
   for (const double d : second) sum += std::min(d, most) * std::min(d, most);
   return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));
@@ -344,6 +351,8 @@ Bins bins_of(const Log& log, double finest_s) {
         fmt::format("only {} row{} over {:.1f} s, and 30 are the least to fit a motor; record more of them (a "
                     "temperature that was read now and then may leave its cell empty).",
                     t.size(), t.size() == 1 ? "" : "s", t.back()));
+  if (std::isnan(first_degC(log)))
+    refuse(fmt::format("no temperature is read in its {:.0f} s; hold out less, or read the sensor earlier.", t.back()));
   out.interval_s = usual_s;
   out.width_s = width_s_of(log, usual_s, finest_s);
   const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);

@@ -438,8 +438,12 @@ Role heat_of(const Log& log) {
 }
 
 double first_degC(const Log& log) {
-  const auto& v = log.of(log.has(Role::housing) ? Role::housing : Role::core);
-  return *std::find_if(v.begin(), v.end(), [](double x) { return !std::isnan(x); });
+  for (const Role role : {Role::housing, Role::core}) {
+    for (const double x : log.of(role)) {
+      if (!std::isnan(x)) return x;
+    }
+  }
+  return missing;
 }
 
 Log without_last(Log log, double fraction) {

@@ -14,6 +14,8 @@
 namespace identify {
 namespace {
 
+using thermal::Drive;
+
 constexpr const char* in_milliseconds =
     "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
     "time_s=COLUMN:ms.";
@@ -190,6 +192,21 @@ double left_open_K(const Problem& problem, const Fit& base, const std::vector<Lo
   return std::sqrt((moved2 / 12 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
 }
 
+/// From half a minute to the next the heat stays within a fifth, and so it does from log to log.
+bool never_changes(const Problem& problem) {
+  constexpr double same = 0.8;
+  double least = 1e300, most = 0;
+  for (const Bins& log : problem.logs) {
+    const double together_s = std::min(30.0, log.duration_s() / 20);
+    const Bins coarse = merged(log, static_cast<std::size_t>(std::max(1.0, std::round(together_s / log.width_s))));
+    for (const Bin& bin : coarse.bins) {
+      const double heat = std::abs(bin.input[log.has_power ? Drive::power_W : Drive::current_A2]);
+      least = std::min(least, heat), most = std::max(most, heat);
+    }
+  }
+  return least > same * most;
+}
+
 }  // namespace
 
 std::string too_poor(const Problem& problem) {
@@ -245,8 +262,12 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
-  if (found.verdict == Verdict::adequate && !problem.belief.known && !base_lines(problem, base, 1)[1].determined)
+  const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };
+  if ((found.verdict == Verdict::adequate && !settles(base)) || (explains && !settles(found.chosen.fit)))
     return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
+  if (never_changes(problem))
+    return "The load never changes, so heat and cooling cannot be told apart; record rests between loads of several "
+           "sizes.";
   return "";
 }
 

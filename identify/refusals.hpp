@@ -13,7 +13,7 @@ namespace identify {
 /// Why a log cannot bear a verdict; empty when it can.
 std::string too_poor(const Problem& problem);
 
-/// Shorter than the housing's time constant, or too short for two resistors to be called adequate? Empty when not.
+/// Shorter than the housing's time constant, or too short or of too even a load for what was found? Empty when not.
 std::string too_short(const Problem& problem, const Fit& base, const Search& found);
 
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
