@@ -55,6 +55,13 @@ const std::map<std::string, Unit>& units() {
   return table;
 }
 
+std::string quantity_of_role(const std::string& role) {
+  std::string quantity;
+  for (std::size_t cut = role.find('_'); cut != std::string::npos && quantity.empty(); cut = role.find('_', cut + 1))
+    quantity = quantity_of(role.substr(cut + 1));
+  return quantity;
+}
+
 }  // namespace
 
 std::optional<Unit> unit_named(const std::string& unit) {
@@ -73,16 +80,30 @@ std::string quantity_of(const std::string& suffix) {
   return unit ? unit->quantity : std::string();
 }
 
+std::string unit_in_name(const std::string& column, const std::string& role) {
+  const std::string wanted = quantity_of_role(role);
+  const auto fits = [&](const std::string& unit) { return !wanted.empty() && quantity_of(unit) == wanted; };
+  if (column.ends_with(')') || column.ends_with(']')) {
+    const std::size_t open = column.find_last_of("([");
+    if (open == std::string::npos) return "";
+    const std::string unit = column.substr(open + 1, column.size() - open - 2);
+    return fits(unit) ? unit : "";
+  }
+  for (std::size_t cut = column.find_first_of("_ "); cut != std::string::npos;
+       cut = column.find_first_of("_ ", cut + 1)) {
+    const std::string unit = column.substr(cut + 1);
+    if (unit.size() > 1 && fits(unit)) return unit;
+  }
+  return "";
+}
+
 void apply_unit(const std::string& unit, const std::string& role, const std::string& where, Exit blame, double& factor,
                 double& offset) {
   const auto known = unit_named(unit);
   if (!known)
     throw UserError(blame,
                     fmt::format("{}: unknown unit '{}'; units: {}.", where, unit, fmt::join(unit_names(), ", ")));
-  std::string wanted;
-  for (std::size_t cut = role.find('_'); cut != std::string::npos && wanted.empty(); cut = role.find('_', cut + 1)) {
-    wanted = quantity_of(role.substr(cut + 1));
-  }
+  const std::string wanted = quantity_of_role(role);
   if (!wanted.empty() && wanted != known->quantity) {
     throw UserError(blame, fmt::format("{}: {} is a {}, but {} is a {}; map another column.", where, unit,
                                        known->quantity, role, wanted));

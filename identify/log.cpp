@@ -71,8 +71,8 @@ std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
   return found;
 }
 
-/// Adds own names of columns that the map does not give to another role. A header such as current_mA, whose stem is
-/// ours and whose unit is not, is a mistake worth a sentence rather than a silently ignored column.
+/// Adds own names of columns that the map does not give to another role, in other units too (current_mA). Of housing_K,
+/// whose unit is a letter that may mean anything, and of two such names a sentence asks.
 void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Source>& found) {
   const auto mapped = [&](const std::string& header) {
     return std::any_of(map.columns.begin(), map.columns.end(),
@@ -88,35 +88,50 @@ void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Sour
     }
     const std::size_t cut = role == Role::neighbour ? name.rfind('_') : name.find('_');
     if (cut == std::string::npos) continue;
+    std::string taken;
     for (const std::string& header : table.names) {
       if (mapped(header) || !header.starts_with(name.substr(0, cut + 1))) continue;
       const std::string unit = header.substr(cut + 1);
-      if (const auto known = unit_named(unit); known && known->quantity == quantity_of(name.substr(cut + 1)))
+      if (const auto known = unit_named(unit); !known || known->quantity != quantity_of(name.substr(cut + 1))) continue;
+      if (unit.size() == 1)
         refuse(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
                            table.file, header, unit, name, name, header, unit));
+      if (!taken.empty())
+        refuse(fmt::format("{}: columns '{}' and '{}' may both be {}; say which with --column {}=NAME.", table.file,
+                           taken, header, name, name));
+      taken = header;
     }
+    if (!taken.empty()) found[role] = {taken};
   }
 }
 
-/// Where each role comes from, and in which unit.
-std::map<Role, Source> resolve(const Table& table, const ColumnMap& map) {
+/// Where each role comes from, and in which unit; a note says which units nobody typed.
+std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::vector<std::string>& notes) {
   std::map<Role, Source> found = from_map(table, map);
   add_own_names(table, map, found);
+  std::vector<std::string> by_row, by_name;
   for (auto& [role, source] : found) {
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
       refuse(
           fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
     const std::string& complaint = table.complaints[index_of(table, source)];
     if (!complaint.empty()) refuse(complaint);
-    if (table.units.empty() || source.unit_said) continue;
-    std::string unit = table.units[index_of(table, source)];
+    if (source.unit_said) continue;
+    std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+    std::vector<std::string>& by = unit.empty() ? by_name : by_row;
+    if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
     if (!unit.empty())
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the row of units below the header, column '{}' (--column {}={}:UNIT overrules it)",
                              table.file, source.column, own_name(role), source.column),
                  Exit::unusable, source.factor, source.offset);
+    if (source.factor != 1 || source.offset != 0) by.push_back(fmt::format("{} in {}", own_name(role), unit));
   }
+  if (!by_row.empty())
+    notes.push_back(fmt::format("Units are taken from the row below the header: {}.", fmt::join(by_row, ", ")));
+  if (!by_name.empty())
+    notes.push_back(fmt::format("Units are taken from the columns' names: {}.", fmt::join(by_name, ", ")));
   return found;
 }
 
@@ -455,7 +470,8 @@ Log without_last(Log log, double fraction) {
 }
 
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
-  const auto found = resolve(table, map);
+  std::vector<std::string> unit_notes;
+  const auto found = resolve(table, map, unit_notes);
   const auto need = [&](bool there, const std::string& what, const std::string& hint) {
     if (!there)
       refuse(fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
@@ -492,6 +508,7 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
       logs.push_back(std::move(log));
     }
   }
+  logs.front().notes.insert(logs.front().notes.begin(), unit_notes.begin(), unit_notes.end());
   if (in_a_session < table.rows())
     logs.front().notes.push_back(fmt::format("{} rows without a session were left out.", table.rows() - in_a_session));
   return logs;

@@ -51,7 +51,7 @@ const std::string& own_name(Role role);
 struct Source {
   std::string column;
   double factor = 1, offset = 0;  // SI = factor * (cell + offset)
-  bool unit_said = false;         // else a row of units in the table may say it
+  bool unit_said = false;         // else a row of units in the table may say it, or the column's name
   std::string said = "";          // column and unit as they were written
 };
 

@@ -245,7 +245,8 @@ int main(int argc, char** argv) {
     score->excludes(other);
   app.footer(
       "What a column may be (--column ROLE=NAME or ROLE=NAME:UNIT, with the UNIT where a NAME ends like one, as in "
-      "housing_degC=T:1:degC; a column called like its role needs no word):\n" +
+      "housing_degC=T:1:degC; a column called like its role, current_mA for current_A too, needs no "
+      "word, and a unit in a NAME, as in 'Time (ms)', is used where none is said):\n" +
       identify::roles_and_units() +
       "\n\n"
       "current_A: the direct current that heats alike through two terminals. Of sinusoidal phase currents it is "

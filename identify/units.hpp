@@ -21,6 +21,10 @@ std::vector<std::string> unit_names();
 /// Quantity of one of our own unit suffixes ("A", "degC", "rad_per_s"); empty when it is none.
 std::string quantity_of(const std::string& suffix);
 
+/// The unit that a column's name ends in, where it is one of what `role` (an own name, unit included) measures: "Time
+/// (ms)", "I [mA]", "current_mA"; else empty. A bare letter is none: T_K and motor_C may be anything.
+std::string unit_in_name(const std::string& column, const std::string& role);
+
 /// Sets factor and offset for a column in `unit` that plays `role` (an own name, unit included). Throws UserError
 /// (`blame`: the command line or the log), saying `where`, when the unit is unknown or measures something else.
 void apply_unit(const std::string& unit, const std::string& role, const std::string& where, wire::pc::Exit blame,

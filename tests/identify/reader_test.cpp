@@ -90,10 +90,57 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::time)[1], 1.5);
   EXPECT_DOUBLE_EQ(logs[0].of(Role::iq)[1], 2);
   EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
+  says(logs[0].notes.front(), "Units are taken from the row below the header: time_s in ms, housing_degC in °F.");
   ColumnMap said;
   add_column(said, "housing_degC=T:degC");
   EXPECT_DOUBLE_EQ(read(text, said)[0].of(Role::housing)[0], 50);
   says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n"), "unknown unit 'Arms'");
+}
+
+TEST(Reader, AUnitInAMappedColumnsNameIsObeyedUnlessOneWasSaid) {
+  const std::string rows = "\n0,1000,50,60\n1500,2000,212,60\n";
+  const std::string text = "Time (ms),Current [mA],T_body degF,n (rpm)" + rows;
+  ColumnMap map;
+  for (const char* column :
+       {"time_s=Time (ms)", "current_A=Current [mA]", "housing_degC=T_body degF", "speed_rad_per_s=n (rpm)"})
+    add_column(map, column);
+  const Log log = read(text, map)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 1.5);
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+  EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
+  EXPECT_NEAR(log.of(Role::speed)[0], 6.283185307, 1e-9);
+  says(
+      log.notes.front(),
+      "Units are taken from the columns' names: time_s in ms, current_A in mA, speed_rad_per_s in rpm, housing_degC in "
+      "degF.");
+  map.columns.erase(Role::time);
+  add_column(map, "time_s=Time (ms):s");
+  EXPECT_DOUBLE_EQ(read(text, map)[0].of(Role::time)[1], 1500);
+  const Log rowed = read("Time (ms),Current [mA],T_body degF,n (rpm)\ns,,," + rows, map)[0];
+  EXPECT_DOUBLE_EQ(rowed.of(Role::current)[1], 2) << "a row of units that says nothing of it";
+}
+
+TEST(Reader, AnOwnNameInAnotherUnitIsKnownByItsName) {
+  const Log log = read("time_ms,current_mA,housing_degF,speed_rpm\n0,1000,50,60\n1500,2000,212,60\n")[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 1.5);
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+  EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
+  EXPECT_NEAR(log.of(Role::speed)[0], 6.283185307, 1e-9);
+  says(log.notes.front(), "current_A in mA");
+  EXPECT_DOUBLE_EQ(read("time_s,current_A,current_mA,housing_degC\n0,1,7,20\n1,2,7,21\n")[0].of(Role::current)[1], 2);
+  says(complaint("time_s,current_mA,current_kA,housing_degC\n0,1,7,20\n"),
+       "columns 'current_mA' and 'current_kA' may both be current_A");
+}
+
+TEST(Reader, ANamesEndThatIsNoUnitOfTheRoleIsIgnored) {
+  for (const char* column : {"T_K", "motor_F", "case F", "core_k", "T_min", "T_ms", "T (min)", "T [case]", "TdegF",
+                             "K)", "(F) case", "T_degC", "T (C)", "degF_old"}) {
+    ColumnMap map;
+    add_column(map, std::string("housing_degC=") + column);
+    const Log log = read("time_s,current_A," + std::string(column) + "\n0,1,20\n1,2,21\n", map)[0];
+    EXPECT_DOUBLE_EQ(log.of(Role::housing)[1], 21) << column;
+    EXPECT_TRUE(log.notes.empty()) << column;
+  }
 }
 
 TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
@@ -257,10 +304,9 @@ TEST(Reader, WhatToDoAboutTimeThatRunsBackwardsGoesByHowItDoes) {
   says(complaint(mixed), "in 20 places (rows out of order); sort the rows by time");
   says(complaint(joined), "split the file there or give it a session column");
 }
-TEST(Reader, AHeaderInAnotherUnitIsRefusedWithTheConversion) {
-  says(complaint("time_s,current_mA,housing_degC\n0,1,20\n"), "--column current_A=current_mA:mA");
-  says(complaint("time_s,current_A,housing_degF\n0,1,20\n"), "--column housing_degC=housing_degF:degF");
-  says(complaint("time_s,current_A,housing_degC,speed_rpm\n0,1,20,3\n"), "--column speed_rad_per_s=speed_rpm:rpm");
+TEST(Reader, AHeaderInAUnitOfOneLetterIsRefusedWithTheConversion) {
+  says(complaint("time_s,current_A,housing_F\n0,1,20\n"), "--column housing_degC=housing_F:F");
+  says(complaint("time_h,current_A,housing_degC\n0,1,20\n"), "--column time_s=time_h:h");
 }
 TEST(Reader, KelvinIsRecognised) { says(complaint(head + "0,1,293\n1,1,294\n"), "looks like kelvin"); }
 TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
