@@ -25,6 +25,7 @@ const std::map<std::string, Unit>& units() {
       {"s", {"time", 1, 0}},
       {"ms", {"time", 1e-3, 0}},
       {"us", {"time", 1e-6, 0}},
+      {"ns", {"time", 1e-9, 0}},
       {"min", {"time", 60, 0}},
       {"h", {"time", 3600, 0}},
       {"A", {"current", 1, 0}},
@@ -45,12 +46,24 @@ const std::map<std::string, Unit>& units() {
       {"rad_per_s", {"speed", 1, 0}},
       {"rad/s", {"speed", 1, 0}},
       {"rpm", {"speed", pi / 30, 0}},
+      {"rev/s", {"speed", 2 * pi, 0}},
       {"deg/s", {"speed", pi / 180, 0}},
       {"deg_per_s", {"speed", pi / 180, 0}},
       {"Hz", {"speed", 2 * pi, 0}},
       {"ohm", {"resistance", 1, 0}},
       {"mohm", {"resistance", 1e-3, 0}},
       {"1", {"number", 1, 0}},
+  };
+  return table;
+}
+
+/// How loggers spell these too, in small letters and without blanks.
+const std::map<std::string, std::string>& spellings() {
+  static const std::map<std::string, std::string> table = {
+      {"rpm", "rpm"},         {"1/min", "rpm"}, {"min-1", "rpm"}, {"degc", "degC"},
+      {"°c", "degC"},         {"ºc", "degC"},  // the sign of an ordinal, for that of a degree
+      {"celsius", "degC"},    {"degf", "degF"}, {"°f", "degF"},   {"ºf", "degF"},
+      {"fahrenheit", "degF"}, {"µs", "us"},     {"μs", "us"},  // the sign micro, and the letter mu
   };
   return table;
 }
@@ -65,8 +78,17 @@ std::string quantity_of_role(const std::string& role) {
 }  // namespace
 
 std::optional<Unit> unit_named(const std::string& unit) {
-  const auto at = units().find(unit);
-  return at == units().end() ? std::nullopt : std::optional<Unit>(at->second);
+  auto at = units().find(unit);
+  if (at == units().end()) {
+    std::string plain;
+    for (const char c : unit) {
+      if (c != ' ') plain += c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+    }
+    const auto spelling = spellings().find(plain);
+    if (spelling == spellings().end()) return std::nullopt;
+    at = units().find(spelling->second);
+  }
+  return at->second;
 }
 
 std::vector<std::string> unit_names() {

@@ -11,6 +11,7 @@
 #include "identify/filled.hpp"
 #include "identify/log.hpp"
 #include "identify/masks.hpp"
+#include "identify/units.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -435,6 +436,25 @@ TEST(Map, AMisspeltRoleIsAnsweredWithTheNearest) {
     EXPECT_EQ(error.exit_code(), 2);
     says(error.what(), "did you mean 'housing_degC'?");
   }
+}
+TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
+  const auto factor = [](const std::string& role, const std::string& unit) {
+    ColumnMap map;
+    identify::add_column(map, role + "=x:" + unit);
+    const identify::Source source = map.columns.begin()->second;
+    EXPECT_TRUE(source.unit_said) << unit;
+    return source.factor;
+  };
+  for (const char* rpm : {"RPM", "Rpm", "rpm", "1/min", "min-1"})
+    EXPECT_NEAR(factor("speed_rad_per_s", rpm), 0.104719755, 1e-9);
+  EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
+  EXPECT_EQ(factor("time_s", "ns"), 1e-9);
+  for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
+  for (const char* degC : {"Deg C", "degC", "deg c", "Celsius", "celsius", "ºC", "°C", "C"})
+    EXPECT_EQ(factor("housing_degC", degC), 1);
+  for (const char* degF : {"Deg F", "DEGF", "Fahrenheit", "ºF", "°F", "F"})
+    EXPECT_NEAR(factor("housing_degC", degF), 0.5555555556, 1e-9);
+  for (const char* none : {"rad.s", "MA", "c", "f", "S", ""}) EXPECT_FALSE(identify::unit_named(none)) << none;
 }
 TEST(Map, AUnitOfAnotherQuantityIsRefused) {
   ColumnMap map;
