@@ -230,6 +230,14 @@ void check_order(const Log& log) {
                   log.name));
 }
 
+/// A clock that counts from 1970 and in no seconds. 1e11 s is in the year 5138.
+void check_epoch(const Log& log, double first_cell) {
+  if (log.of(Role::time).front() < 1e11) return;
+  const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
+  refuse(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say --column time_s=COLUMN:{}.",
+                     log.name, first_cell, unit, unit));
+}
+
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
   const auto& t = log.of(Role::time);
   std::vector<std::size_t> falls;
@@ -400,6 +408,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   }
   if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power))
     refuse(name + ": the heat input (current_A, iq_A or power_W) has no value at all; record the log again.");
+  check_epoch(log, time[rows.front()]);
   if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();

@@ -157,6 +157,22 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
     says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
 }
 
+TEST(Reader, ACountSince1970InNoSecondsIsRefusedWithItsUnit) {
+  const auto rows = [](const std::string& zeros) {
+    return head + "1764000000" + zeros + ",1,20\n1764000002" + zeros + ",2,21\n";
+  };
+  EXPECT_NEAR(read(rows(""))[0].of(Role::time)[1], 2, 1e-6);
+  for (const auto& [zeros, unit] : {std::pair("000", "ms"), std::pair("000000", "us"), std::pair("000000000", "ns")}) {
+    says(complaint(rows(zeros)), std::string("looks like ") + unit + " since 1970; say --column time_s=COLUMN:" + unit);
+    ColumnMap map;
+    add_column(map, std::string("time_s=time_s:") + unit);
+    EXPECT_NEAR(read(rows(zeros), map)[0].of(Role::time)[1], 2, 1e-6);
+  }
+  ColumnMap still_too_coarse;
+  add_column(still_too_coarse, "time_s=time_s:ms");
+  says(complaint(rows("000000000"), still_too_coarse), "time_s=COLUMN:ns");
+}
+
 TEST(Reader, AClockThatPassesMidnightGoesOn) {
   const Log log = read(head + "23:59:59,1,20\n00:00:01,1,20\n23:00:00,1,20\n00:00:02,2,21\n")[0];
   EXPECT_NEAR(log.of(Role::time)[1], 2, 1e-9);
