@@ -432,8 +432,8 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   if (equals == std::string::npos) {
     throw UserError(Exit::usage, where + ": write it as role=column or role=column:unit.");
   }
-  const Role role = role_named(text.substr(0, equals), where);
-  const std::string rest = text.substr(equals + 1);
+  const Role role = role_named(std::string(trimmed(std::string_view(text).substr(0, equals))), where);
+  const std::string rest(trimmed(std::string_view(text).substr(equals + 1)));
   const std::size_t colon = rest.rfind(':');
   if (rest.empty() || colon == 0) {
     throw UserError(Exit::usage, where + ": the column's name is missing behind '='.");
@@ -442,7 +442,7 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   source.said = rest;
   // What is no unit belongs to the column's name.
   if (colon != std::string::npos && unit_named(rest.substr(colon + 1))) {
-    source.column = rest.substr(0, colon);
+    source.column = trimmed(std::string_view(rest).substr(0, colon));
     apply_unit(rest.substr(colon + 1), own_name(role), where, Exit::usage, source.factor, source.offset);
     source.unit_said = true;
   }

@@ -23,13 +23,6 @@ using wire::pc::UserError;
 constexpr std::size_t longest_line = 1 << 20;
 constexpr std::size_t least_columns = 3;  // a time, what heats, and a temperature
 
-std::string_view trimmed(std::string_view s) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!s.empty() && blank(s.front())) s.remove_prefix(1);
-  while (!s.empty() && blank(s.back())) s.remove_suffix(1);
-  return s;
-}
-
 std::string whole_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
@@ -67,6 +60,24 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
     if (at >= line.size()) return true;
     ++at;
   }
+}
+
+/// Where a row ends: a line end in a quoted cell is none. The first one where the quote is not closed soon.
+std::size_t end_of_row(std::string_view rest, char separator) {
+  const std::size_t line_end = rest.find('\n');
+  const std::string_view line = rest.substr(0, line_end);
+  if (std::count(line.begin(), line.end(), '"') % 2 == 0 || trimmed(line).starts_with('#')) return line_end;
+  bool quoted = false, begins = true;  // a quote within a cell's words opens nothing
+  for (std::size_t i = 0; i < std::min(rest.size(), longest_line); ++i) {
+    const char c = rest[i];
+    if (c == '"' && (quoted || begins)) {
+      quoted = !quoted;
+    } else if (!quoted) {
+      if (c == '\n') return i;
+      begins = c == separator || (begins && c == ' ');
+    }
+  }
+  return quoted ? line_end : std::string_view::npos;
 }
 
 bool means_missing(std::string_view s) {
@@ -151,7 +162,15 @@ bool all_words(const std::vector<std::string_view>& cells, bool decimal_comma) {
          !std::all_of(cells.begin(), cells.end(), means_missing);
 }
 
-std::string shown(std::string_view s) { return std::string(s.substr(0, 40)) + (s.size() > 40 ? "..." : ""); }
+/// What a quoted cell says, in one line.
+std::string one_line(std::string_view s) {
+  std::string line(s);
+  std::erase(line, '\r');
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  return line;
+}
+
+std::string shown(std::string_view s) { return one_line(s.substr(0, 40)) + (s.size() > 40 ? "..." : ""); }
 
 char separator_of(std::string_view header) {
   char best = ',';
@@ -161,6 +180,16 @@ char separator_of(std::string_view header) {
     if (n > most) best = c, most = n;
   }
   return best;
+}
+
+/// An object, or a list of what a list may hold; [Data] is a line that some loggers write.
+bool is_json(std::string_view text) {
+  constexpr std::string_view blank = " \t\r\n";
+  const std::string_view begin = text.substr(std::min(text.find_first_not_of(blank), text.size()));
+  if (!begin.starts_with('[')) return begin.starts_with('{');
+  const std::size_t next = begin.find_first_not_of(blank, 1);
+  return next != std::string_view::npos &&
+         std::string_view("[{\"-0123456789").find(begin[next]) != std::string_view::npos;
 }
 
 /// Has one of the next lines the columns of a log?
@@ -195,7 +224,7 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
            "time_s,current_A,housing_degC) first.");
   }
   while (header.size() > 1 && header.back().empty()) header.pop_back();
-  for (const auto name : header) table.names.emplace_back(trimmed(name));
+  for (const auto name : header) table.names.push_back(one_line(trimmed(name)));
   table.columns.resize(header.size());
   table.complaints.resize(header.size());
   table.of_day.resize(header.size());
@@ -218,6 +247,13 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
 }
 
 }  // namespace
+
+std::string_view trimmed(std::string_view s) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!s.empty() && blank(s.front())) s.remove_prefix(1);
+  while (!s.empty() && blank(s.back())) s.remove_suffix(1);
+  return s;
+}
 
 std::size_t count_told(const std::vector<double>& cells) {
   return static_cast<std::size_t>(std::count_if(cells.begin(), cells.end(), [](double x) { return !std::isnan(x); }));
@@ -242,13 +278,21 @@ Table read_table(const std::string& path) {
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   if (rest.starts_with("\xFF\xFE") || rest.starts_with("\xFE\xFF"))
     refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
+  if (is_json(rest)) {
+    refuse(table, 1,
+           "this is JSON; write it as CSV: a line of column names (such as time_s,current_A,housing_degC), then one "
+           "line a row.");
+  }
   char separator = ',';
   std::vector<std::string_view> cells;
   std::string_view remark;  // the last '#' line: some programs write the header there
-  for (int line = 1; !rest.empty(); ++line) {
-    const std::size_t end = rest.find('\n');
+  int lines = 1;            // of the row
+  for (int line = 1; !rest.empty(); line += lines) {
+    if (table.names.empty()) separator = separator_of(rest.substr(0, rest.find('\n')));
+    const std::size_t end = end_of_row(rest, separator);
     const bool closed = end != std::string_view::npos;
     const std::string_view row = rest.substr(0, end);
+    lines = 1 + static_cast<int>(std::count(row.begin(), row.end(), '\n'));
     rest.remove_prefix(closed ? end + 1 : rest.size());
     if (row.size() > longest_line) {
       refuse(table, line,
@@ -264,7 +308,7 @@ Table read_table(const std::string& path) {
       continue;
     }
     if (table.names.empty()) {
-      separator = separator_of(row);
+      if (bare.find_first_not_of(",;\t\" ") == std::string_view::npos) continue;
       if (!split(row, separator, cells)) refuse(table, line, "a quote is opened and never closed; repair the header.");
       if (cells.size() < least_columns && widens(rest)) continue;  // what some loggers write before the table
       if (name_columns(table, cells, remark, separator, line)) continue;
@@ -275,7 +319,8 @@ Table read_table(const std::string& path) {
     if (!whole || cells.size() != table.names.size()) {
       refuse(table, line,
              fmt::format(
-                 "the row has {} of {} cells{}", cells.size(), table.names.size(),
+                 "the row has {} of {} cells{}{}", cells.size(), table.names.size(),
+                 lines > 1 ? fmt::format(", one of them in quotes until line {}", line + lines - 1) : "",
                  closed ? "; repair or delete this line."
                         : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
     }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
 //
-//   in   a file: comma, semicolon or tab; quotes; CRLF; byte-order mark; '#' lines before the header, or before it as
-//        well; a row of units below it; decimal comma when the separator is a semicolon; times as ISO 8601 writes them
+//   in   a file: comma, semicolon or tab; quotes, and line ends in them; CRLF; byte-order mark; '#' lines and rows of
+//        empty cells before the header, or '#' before it as well; a row of units below it; decimal comma when the
+//        separator is a semicolon; times as ISO 8601 writes them
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
 //        mistake only for who uses it
 //
@@ -11,11 +12,15 @@
 
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace identify {
 
 inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+/// Without blanks, tabs and carriage returns at its ends.
+std::string_view trimmed(std::string_view s);
 
 /// How many cells are not missing; and the largest of these without its sign, 0 of none.
 std::size_t count_told(const std::vector<double>& cells);

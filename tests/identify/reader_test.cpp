@@ -198,6 +198,48 @@ TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
   EXPECT_EQ(table.rows(), 2u);
 }
 
+TEST(Reader, RowsOfEmptyCellsBeforeTheHeaderAreSkipped) {
+  const Log log = read(",,,,\n\"\",\"\" ,\n \n" + head + "0,1,20\n1,2,21\n")[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+  says(complaint(",,\n" + head + "0,1,20\n1,oops,20\n"), "line 4: ");
+}
+
+TEST(Reader, ALineEndInAQuotedCellIsPartOfIt) {
+  ColumnMap map;
+  add_column(map, "time_s=Time (ms)");
+  const std::string text =
+      "\"Time\n(ms)\",\"a \"\"note\"\"\r\nof it\",current_A,housing_degC\n0,\"x,\ny\",1,20\n1000,z,2,";
+  const Log log = read(text + "21\n", map)[0];
+  ASSERT_EQ(log.of(Role::time).size(), 2u);
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 1);
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+  says(complaint(text + "oops\n", map), "line 6: 'oops'");
+  says(complaint(text + "\"no\nnumber\"", map), "line 6: 'no number' in column 'housing_degC'");
+}
+
+TEST(Reader, AQuoteThatIsNotClosedIsRefusedWithItsLine) {
+  std::string rows = "0,\"1,20\n";
+  for (int i = 1; i < 200000; ++i) rows += std::to_string(i) + ",1,20\n";
+  says(complaint(head + rows), "line 2: the row has 1 of 3 cells");
+  says(complaint(head + "0,1,\"20\n1,1,20\n2,1,\"20\n"),
+       "line 2: the row has 3 of 3 cells, one of them in quotes until line 4");
+  EXPECT_EQ(read("time_s,current_A,housing_degC,tap 5\"\n0,1,20,\n1,2,21,\n")[0].of(Role::time).size(), 2u);
+}
+
+TEST(Reader, JsonIsRefusedWithWhatToWriteInstead) {
+  for (const char* json :
+       {"{\"time_s\": [0, 1]}\n", "\n[\n {\"time_s\": 0},\n {}]", "[[0,1,20],[1,1,20]]", "[\"a\"]", "{"})
+    says(complaint(json), "this is JSON; write it as CSV: a line of column names");
+  EXPECT_EQ(read("[Data]\n" + head + "0,1,20\n1,2,21\n")[0].of(Role::time).size(), 2u);
+}
+
+TEST(Reader, BlanksAroundANameInAMapAreNoPartOfIt) {
+  ColumnMap map;
+  add_column(map, " time_s = t one :ms ");
+  add_column(map, "housing_degC= body ");
+  EXPECT_DOUBLE_EQ(read(" t one ,current_A, body\n0,1,20\n500,2,21\n", map)[0].of(Role::time)[1], 0.5);
+}
+
 TEST(Reader, TextBehindAQuoteIsNotDropped) {
   says(complaint(head + "\"1\"5,1,20\n"), "line 2");
   EXPECT_DOUBLE_EQ(read(head + "\"1.5\" ,1,20\n\"2\",1,21\n")[0].of(Role::time)[1], 0.5);
