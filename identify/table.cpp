@@ -137,6 +137,13 @@ bool moment(std::string_view s, double& value) {
   return true;
 }
 
+/// Perhaps a date or a time, in no form that is read.
+bool like_a_moment(std::string_view s) {
+  const auto many = [&](char c) { return std::count(s.begin(), s.end(), c); };
+  return s.find_first_of("0123456789") != std::string_view::npos &&
+         (many(':') > 0 || many('/') > 0 || many('.') > 1 || many('-') > 1);
+}
+
 /// A cell as a number; false when it is neither a number nor a word for "missing". An infinite value counts as missing.
 bool number(std::string_view s, bool decimal_comma, double& value) {
   if (means_missing(s)) return value = missing, true;
@@ -237,8 +244,12 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
     if (!number(cells[c], decimal_comma, value) && table.complaints[c].empty()) {
       table.complaints[c] =
           at_line(table, line,
-                  fmt::format("'{}' in column '{}' is not a number; repair it or leave the cell empty.",
-                              shown(cells[c]), shown(table.names[c])));
+                  fmt::format("'{}' in column '{}' is not a number{}; repair it or leave the cell empty.",
+                              shown(cells[c]), shown(table.names[c]),
+                              like_a_moment(cells[c])
+                                  ? ", nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
+                                    "2026-11-21T08:15:30.5+01:00)"
+                                  : ""));
     }
     table.columns[c].push_back(value);
     if (time_of_day(cells[c], unused)) table.of_day[c] = true;

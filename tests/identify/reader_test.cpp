@@ -157,6 +157,18 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
     says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
 }
 
+TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
+  const std::string forms =
+      " is not a number, nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
+      "2026-11-21T08:15:30.5+01:00); repair it";
+  for (const char* date : {"31.12.2025", "31.12.2025 10:00:00", "12/31/2025 10:00:00", "10:00:00 AM", "8:15 PM",
+                           "2025-06-01", "Dec 31 10:00:00 2025"})
+    says(complaint(head + date + ",1,20\n"), forms);
+  for (const char* time : {"12.5", "08:15:30", "1:05.3", "2026-11-21 08:15:30", "2026-11-21T08:15:30.5+01:00"})
+    EXPECT_EQ(read(head + time + ",1,20\n")[0].of(Role::time).size(), 1u) << time;
+  says(complaint(head + "1.5x,1,20\n"), "'1.5x' in column 'time_s' is not a number; repair it");
+}
+
 TEST(Reader, ACountSince1970InNoSecondsIsRefusedWithItsUnit) {
   const auto rows = [](const std::string& zeros) {
     return head + "1764000000" + zeros + ",1,20\n1764000002" + zeros + ",2,21\n";
