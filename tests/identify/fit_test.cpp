@@ -164,6 +164,17 @@ TEST(Problem, AFilterTakesNoNoiseAwayThatLastsLongerThanItself) {
   EXPECT_GT(filtered_K(1), plain_K / 3) << "0.01 from row to row";
 }
 
+TEST(Bins, AJumpOfACoarseSensorIsNoNoise) {
+  identify::Log log;
+  for (int i = 0; i < 1000; ++i) {
+    const double truth_degC = 25 + 0.01 * i + (i < 500 ? 0 : 40);  // interference that ends
+    log.of(identify::Role::time).push_back(i);
+    log.of(identify::Role::current).push_back(1);
+    log.of(identify::Role::housing).push_back(0.25 * std::round(4 * truth_degC));
+  }
+  EXPECT_LT(identify::bins_of(log, 1).housing_noise_K, 0.15) << "0.73 with the jump";
+}
+
 TEST(Bins, WhatIsMergedBeginsAgainWhereTheLogDoes) {
   identify::Bins log;
   log.width_s = 1;

@@ -17,6 +17,7 @@
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
+#include "tests/identify/hidden_log.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "tests/identify/traction.hpp"
 
@@ -311,6 +312,41 @@ TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
   EXPECT_NE(r.out.find("housing_degC was filled in by repeating between readings about 1 s apart"), std::string::npos)
       << r.out;
 }
+
+TEST(BadInput, ALoadThatNeverChanges) {
+  const auto as_it_is = [](auto&, int) { return true; };
+  tests::BenchOptions options;
+  options.current_A = [](double, std::mt19937_64&) { return 2.0; };
+  refused(spoilt(as_it_is, options), "The load never changes");
+  options.current_A = [](double t, std::mt19937_64&) { return t < 120 ? 0.0 : 2.0; };
+  const Outcome rests = run(spoilt(as_it_is, options) + " --motor ec-16-40w");
+  EXPECT_EQ(rests.out.find("The load never changes"), std::string::npos) << rests.out;
+}
+
+TEST(BadInput, NoTemperatureBeforeWhatIsHeldOut) {
+  const std::string path = spoilt([](auto& row, int i) {
+    row[4] = "";  // no ambient: the first reading would be taken for it
+    row[3] = i < 8000 ? "" : std::to_string(30 + 0.01 * (i - 8000));
+    return row[5] = "", true;
+  });
+  const Outcome r = run(path + " --motor ec-16-40w --hold-out 0.25");
+  EXPECT_EQ(r.code, 3);
+  EXPECT_NE(r.out.find("no temperature is read in its 675 s; hold out less"), std::string::npos) << r.out;
+}
+
+TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
+  // A housing of twenty minutes over five: a third mass was named of a sensor that feels the winding.
+  tests::HiddenLogOptions o;
+  o.core = tests::Core::none;
+  o.seed = 3;
+  o.seconds = 300;
+  o.effects = {"sensor_placement"};
+  const std::string path = (std::filesystem::temp_directory_path() / "hotcore_five_minutes.csv").string();
+  tests::make_hidden_log(o, path);
+  const Outcome r = run(path);
+  EXPECT_NE(r.out.find("does not come near where it settles"), std::string::npos) << r.out;
+}
+
 TEST(BadInput, NothingThatVaries) {
   refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "The temperatures move by 0.0 K");
 }
