@@ -16,6 +16,17 @@ struct Signal {
   double (*of)(const Bin&);
 };
 
+bool both_ways(const Problem& problem) {
+  bool plus = false, minus = false;
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) plus = plus || bin.signed_A > 0, minus = minus || bin.signed_A < 0;
+  }
+  return plus && minus;
+}
+
+/// A signal whose standard deviation is less than half a percent of it tells nothing apart.
+constexpr double least_variance = 0.005 * 0.005;
+
 std::vector<Signal> signals(const Problem& problem) {
   std::vector<Signal> s;
   if (problem.heated_by_power())
@@ -23,7 +34,7 @@ std::vector<Signal> signals(const Problem& problem) {
   else {
     s.push_back({"current squared", [](const Bin& b) { return b.input[Drive::current_A2]; }});
     s.push_back({"size of the current", [](const Bin& b) { return b.input[Drive::current_A]; }});
-    s.push_back({"sign of the current", [](const Bin& b) { return b.signed_A; }});
+    if (both_ways(problem)) s.push_back({"sign of the current", [](const Bin& b) { return b.signed_A; }});
   }
   if (problem.speed08_mean > 0) {
     s.push_back({"speed", [](const Bin& b) { return b.input[Drive::speed_rad_per_s]; }});
@@ -45,7 +56,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   }
   if (n < 10) return 0;
   const double va = aa - sa * sa / n, vb = bb - sb * sb / n;
-  return va > 1e-12 * aa && vb > 1e-12 * bb ? (ab - sa * sb / n) / std::sqrt(va * vb) : 0;
+  return va > least_variance * aa && vb > least_variance * bb ? (ab - sa * sb / n) / std::sqrt(va * vb) : 0;
 }
 
 std::vector<double> smoothed(const std::vector<double>& v, double share) {
@@ -120,9 +131,9 @@ std::string unusual_in(const Bins& log, std::size_t from, std::size_t to, const 
       (k >= from && k < to ? sum_inside : sum_outside) += v;
       square += v * v;
     }
-    if (outside < 1 || inside < 1) continue;
-    const double sd = std::sqrt(std::max(1e-12, square / bins - std::pow((sum_inside + sum_outside) / bins, 2)));
-    const double z = (sum_inside / inside - sum_outside / outside) / sd;
+    const double variance = square / bins - std::pow((sum_inside + sum_outside) / bins, 2);
+    if (outside < 1 || inside < 1 || !(variance > least_variance * square / bins)) continue;
+    const double z = (sum_inside / inside - sum_outside / outside) / std::sqrt(variance);
     if (std::abs(z) > most) most = std::abs(z), out = std::string(z > 0 ? "high " : "low ") + s.name;
   }
   if (!out.empty()) return out;
