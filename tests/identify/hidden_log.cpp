@@ -364,13 +364,16 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   const double noise = o.noisy ? 1 : 0;
   const auto in_steps = [](double degC, double step_K) { return step_K * std::round(degC / step_K); };
   double wander = 0.05 * d.gauss();
+  Draw chip{std::mt19937_64(o.seed * 15485863 + 5)};  // its own stream, for the same reason
+  const double chip_A = noise * o.current_noise * std::sqrt(mean2);
   const double keep = std::exp(-row_s / 20), direct = std::sqrt(3.0) / 2;
   std::string text;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     wander = keep * wander + std::sqrt(1 - keep * keep) * 0.05 * d.gauss();
     const double reading = t.sensed[i] + noise * (wander + 0.2 * d.gauss());
     const double housing = o.noisy ? in_steps(reading, o.step_K) : reading;
-    const double amps = rows[i].current_A == 0 ? 0 : rows[i].current_A * (1 + noise * 0.01 * d.gauss());
+    double amps = rows[i].current_A == 0 ? 0 : rows[i].current_A * (1 + noise * 0.01 * d.gauss());
+    if (chip_A > 0) amps += chip_A * chip.gauss();
     fmt::format_to(std::back_inserter(text), "{:.1f},{:.4f},{:.2f},{:.3f},{:.2f},{:.2f},{:.2f}",
                    static_cast<double>(i) * row_s, amps * direct, rows[i].speed_rad_per_s, housing,
                    ambient + 0.05 * d.gauss(), neighbour[i] + 0.1 * d.gauss(), frame[i] + 0.1 * mount.gauss());

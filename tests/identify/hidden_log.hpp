@@ -30,9 +30,10 @@ struct HiddenLogOptions {
   bool mostly_small = false;              // sizes of 1..10 K are drawn evenly in their logarithm, not in themselves
   double structure = 0.1;  // how far the clean motor is from two nodes: teeth, yoke, frame, 1 as host-sim has them
   double seconds = 1200;
-  bool small_ones = false;  // eleven small effects besides
-  double step_K = 0.1;      // of what the housing sensor tells; where it is coarser, of a dense winding sensor too
-  bool noisy = true;        // false: the same log as the sensors would read it without noise and steps
+  bool small_ones = false;   // eleven small effects besides
+  double step_K = 0.1;       // of what the housing sensor tells; where it is coarser, of a dense winding sensor too
+  double current_noise = 0;  // white, of the current's rms, at rest as well; beside 1 % of itself
+  bool noisy = true;         // false: the same log as the sensors would read it without noise and steps
   // A further log of the same motor with the same effect, sized as before: another duty and noise from this seed, or
   // this profile played.
   std::uint64_t again = 0;

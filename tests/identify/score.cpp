@@ -191,8 +191,9 @@ struct Arguments {
   std::string only, remove;
   int seeds = 20, at_most = 0;
   std::uint64_t first = tests::rotating_seed();
-  double structure = 0.1, strength = 1, step_K = 0.1;
-  bool mostly_small = false, verbose = false, explain = false, json = false, check = false, quick = false;
+  double structure = 0.1, strength = 1, step_K = 0.1, current_noise = 0;
+  bool mostly_small = false, verbose = false, explain = false, json = false, check = false, quick = false,
+       blind = false;
   identify::Margins margins;
 };
 
@@ -210,6 +211,8 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       c.log.mostly_small = a.mostly_small;
       c.log.structure = a.structure;
       c.log.step_K = a.step_K;
+      c.log.current_noise = a.current_noise;
+      c.blind = a.blind;
       c.log.small_ones = row.hidden == Hidden::dominant;
       std::uint64_t mixed = 0;
       for (const char letter : tests::joined(effects)) mixed = mixed * 131 + static_cast<unsigned char>(letter);
@@ -382,6 +385,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.01, 1.0))  // of no size at all, teeth and yoke have no time constant
       ->capture_default_str();
   app.add_option("--step", a.step_K, "K, of what the sensors tell: 1 = whole degrees")->capture_default_str();
+  app.add_option("--current-noise", a.current_noise, "white, of the current's rms")->capture_default_str();
   app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")->capture_default_str();
   app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
   app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();
@@ -389,7 +393,8 @@ int main(int argc, char** argv) {
   app.add_option("--tie", a.margins.tie, "lead asked for a name")->capture_default_str();
   app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")->capture_default_str();
   app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")->capture_default_str();
-  app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
+  auto* quick = app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
+  app.add_flag("--blind", a.blind, "identify is given no motor sheet")->needs(quick);
   app.add_flag("--check", a.check, "end with an error where what is held is missed");
   app.add_flag("--verbose", a.verbose, "one line a log");
   app.add_flag("--explain", a.explain, "with --verbose, identify's reasoning");

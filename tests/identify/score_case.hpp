@@ -17,6 +17,7 @@ struct CaseOptions {
   HiddenLogOptions log;
   std::vector<std::string> removed;  // ids taken out of identify's table
   identify::Margins margins;
+  bool blind = false;  // no motor sheet is given; parameters, in another gauge then, are not compared
   // What costs more logs or fits is measured on demand.
   bool gain = false;          // the winding on another log
   bool separability = false;  // D of the truth
