@@ -230,8 +230,9 @@ double width_s_of(const Log& log, double usual_s, double finest_s) {
   return usual_s * std::max(1.0, std::round(wanted_s / usual_s));
 }
 
-/// Each sample's drives and boundaries, for as long as it holds, as means over the bins that it touches.
-void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in) {
+/// Each sample's drives and boundaries, for as long as it holds, as means over the bins that it touches. `more_A2`:
+/// what flows beside what the samples' squares say.
+void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in, double more_A2) {
   const auto& t = log.of(Role::time);
   std::vector<double> covered(out.bins.size(), 0.0);
   for (std::size_t i = 0; i < t.size(); ++i) {
@@ -245,6 +246,7 @@ void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in) {
       Bin& bin = out.bins[b];
       covered[b] += share;
       add_moment(bin, share, held * in.amplitude_A[i], held * in.sampled_A[i], held * in.speed_rad_per_s[i]);
+      bin.input[Drive::current_A2] += share * held * more_A2;
       bin.input[Drive::power_W] += share * held * in.power_W[i];
       for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary_degC[s][i];
       from = to;
@@ -364,12 +366,10 @@ Bins bins_of(const Log& log, double finest_s) {
   const double to_speed = moved_towards_speed(in, out.current_noise_A);
   if (!rippled) in.sampled_A = in.amplitude_A;
   out.noisy_share = 1 - to_speed;
-  add_inputs(out, log, usual_s, in);
   // What rest shows flows, or is the sensor's: half of it is taken for heat, and fits average over the other (leeway).
   // Of the square of a current that was moved, noise left less than nothing.
   const double noise2_in_square = to_speed > 0 ? to_speed - 1 : 1;
-  for (Bin& bin : out.bins)
-    bin.input[Drive::current_A2] += (0.5 - noise2_in_square) * out.current_noise_A * out.current_noise_A;
+  add_inputs(out, log, usual_s, in, (0.5 - noise2_in_square) * out.current_noise_A * out.current_noise_A);
   if (!log.has(Role::speed)) {
     for (Bin& bin : out.bins) bin.stalled_A2 = 0;  // it may have turned
   }
