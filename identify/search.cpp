@@ -14,6 +14,11 @@
 namespace identify {
 namespace {
 
+/// What the noise of the current may move: a cause that moves no more, or a set that is no further away, may be that.
+double of_current_K(const Problem& problem, const Margins& margins) {
+  return margins.of_current * problem.noise.of_current_K;
+}
+
 /// How far two fits differ, rms over the logs: the larger of winding and housing reading.
 double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
   double core = 0, housing = 0, n = 0;
@@ -58,7 +63,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
   const double moved = moved_K(problem, pair.fit, single.fit);
-  if (moved < std::max(margins.noticeable_K, margins.of_current * problem.noise.of_current_K))
+  if (moved < std::max(margins.noticeable_K, of_current_K(problem, margins)))
     return fmt::format(
         "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.", both, more,
         moved);
@@ -110,7 +115,7 @@ void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all
 bool noticeable(const Problem& problem, const Disturbance& d, const Margins& margins) {
   return d.gain > margins.remains &&
          d.noise.disturbance_K > std::max({margins.disturbed_K, step_noise_share * coarsest_step_K(problem),
-                                           margins.of_current * problem.noise.of_current_K});
+                                           of_current_K(problem, margins)});
 }
 
 /// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
@@ -120,8 +125,7 @@ bool ends_without_a_name(const Problem& problem, const Field& field, const Distu
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
   const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
   const bool disturbed = noticeable(problem, without_causes, margins);
-  if (gain > margins.detect &&
-      (moves >= std::max(margins.worth_K, margins.of_current * problem.noise.of_current_K) || disturbed))
+  if (gain > margins.detect && (moves >= std::max(margins.worth_K, of_current_K(problem, margins)) || disturbed))
     return false;
   out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
   out.steps.push_back(
@@ -253,16 +257,17 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
 /// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
 /// from the best by no more than what is left.
 void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
+  const double by_noise_K = of_current_K(problem, margins);
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
-    const double behind = out.chosen.gain - c.gain, of_current_K = margins.of_current * problem.noise.of_current_K;
-    if (c.chosen || (behind >= reach && of_current_K == 0)) continue;
+    const double behind = out.chosen.gain - c.gain;
+    if (c.chosen || (behind >= reach && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
     if (behind >= margins.tie) {
       const double apart_K = moved_K(problem, out.chosen.fit, c.fit);
       const bool near = behind < reach && (out.tied.size() == 1 || apart_K <= margins.left_apart * left.after_K);
-      if (!near && !(apart_K < of_current_K)) continue;
+      if (!near && !(apart_K < by_noise_K)) continue;
     }
     c.tied = true;
     out.tied.push_back(ids);
