@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "identify/candidates.hpp"
 #include "identify/fit.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -154,6 +155,18 @@ void rough_search(Problem& whole) {
     const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
     if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
   }
+  // A housing that answers at once is fitted best by both masses as one, and no motor is so.
+  const auto centred_at = [](Belief belief, const Fit& f) {
+    const auto believed = [](double value, const InCatalogues& share, double of) {
+      return std::clamp(value, share.least / beyond_catalogues * of, share.most * beyond_catalogues * of);
+    };
+    const Physical p = physical(f.x);
+    belief.R2_K_per_W = p.R2_K_per_W;
+    belief.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / (C1_of_C2.most * beyond_catalogues));
+    belief.R1_K_per_W = believed(p.R1_K_per_W, R1_of_R2, p.R2_K_per_W);
+    belief.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, belief.C2_J_per_K);
+    return belief;
+  };
   Belief best;
   double least = 1e300;
   for (const double housing_s : {120.0, 600.0, 2400.0}) {
@@ -169,19 +182,14 @@ void rough_search(Problem& whole) {
       const Fit f = fit(problem, {});
       if (f.cost >= least || f.x.size() == 0) continue;
       least = f.cost;
-      best = b;
-      // A housing that answers at once is fitted best by both masses as one, and no motor is so.
-      const Physical p = physical(f.x);
-      best.R2_K_per_W = p.R2_K_per_W;
-      const auto believed = [](double value, const InCatalogues& share, double of) {
-        return std::clamp(value, share.least / beyond_catalogues * of, share.most * beyond_catalogues * of);
-      };
-      best.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / (C1_of_C2.most * beyond_catalogues));
-      best.R1_K_per_W = believed(p.R1_K_per_W, R1_of_R2, p.R2_K_per_W);
-      best.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, best.C2_J_per_K);
+      best = centred_at(b, f);
     }
   }
-  if (least < 1e300) whole.belief = best;
+  if (least == 1e300) return;
+  problem.belief = best;
+  const Fit alone = best_alone(problem);
+  const bool bent = alone.cost < least / 2;  // beyond recognition, by what is missing
+  whole.belief = bent ? centred_at(best, alone) : best;
 }
 
 /// A sensor that feels the winding shows how its temperature bends within a bin. Where a fit with such a sensor has it
