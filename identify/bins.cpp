@@ -67,6 +67,7 @@ double reading_noise(const std::vector<double>& v) {
 
 struct Inputs {
   std::vector<double> amplitude_A, sampled_A, power_W, speed_rad_per_s, boundary_degC[thermal::boundary_count];
+  std::vector<bool> enabled;
 };
 
 /// Length of the current vector with the sign of its torque, from iq_A and, where it is there, id_A.
@@ -111,8 +112,8 @@ Inputs inputs_of(const Log& log, Bins& out) {
   } else {
     const double first = std::isnan(log.sink_degC) ? first_degC(log) : log.sink_degC;
     sink.assign(t.size(), first);
-    out.notes.push_back(
-        fmt::format("No ambient temperature was recorded; the first reading, {:.1f} degC, is taken for it.", first));
+    out.notes.push_back(fmt::format(
+        "No ambient temperature was recorded; what the log begins at, {:.1f} degC, is taken for it.", first));
   }
   for (auto& b : in.boundary_degC) b = sink;
   out.has_frame = log.has(Role::frame);
@@ -223,6 +224,18 @@ void add_ahead(Bins& out, const Log& log, const Inputs& in) {
   }
 }
 
+/// Rows in which the bridge is on. A sensor's offset and noise at rest, four standard deviations of the current's or a
+/// hundredth of the most that is read, do not switch it on.
+std::vector<bool> enabled(const Inputs& in, double noise_A) {
+  const auto least = [](const std::vector<double>& v) { return 0.01 * largest_magnitude(v); };
+  const double least_A = std::max(4 * noise_A, least(in.amplitude_A));
+  const double least_rad_per_s = least(in.speed_rad_per_s);
+  std::vector<bool> on(in.amplitude_A.size());
+  for (std::size_t i = 0; i < on.size(); ++i)
+    on[i] = std::abs(in.amplitude_A[i]) > least_A || std::abs(in.speed_rad_per_s[i]) > least_rad_per_s;
+  return on;
+}
+
 /// A whole number of samples a bin, so that all bins hold equally many.
 double width_s_of(const Log& log, double usual_s, double finest_s) {
   const double duration_s = log.of(Role::time).back();
@@ -248,6 +261,7 @@ void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in, dou
       add_moment(bin, share, held * in.amplitude_A[i], held * in.sampled_A[i], held * in.speed_rad_per_s[i]);
       bin.input[Drive::current_A2] += share * held * more_A2;
       bin.input[Drive::power_W] += share * held * in.power_W[i];
+      bin.input[Drive::enabled] += in.enabled[i] ? share * held : 0;
       for (int s = 0; s < thermal::boundary_count; ++s) bin.input.boundary_degC[s] += share * in.boundary_degC[s][i];
       from = to;
     }
@@ -320,7 +334,6 @@ void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, do
   in[Drive::speed3_rad3_per_s3] += share * w * w * w;
   in[Drive::current2_speed2] += share * a * a * w * w;
   in[Drive::current_speed] += share * a * w;
-  in[Drive::enabled] += share * (a2 > 0 || w > 0 ? 1 : 0);
   in[Drive::speed_to_0_8] += share * (w > 0 ? std::pow(w, 0.8) : 0);
   bin.signed_A += share * sampled_A;
   bin.stalled_A2 += w < stalled_rad_per_s ? share * a2 : 0;
@@ -365,6 +378,7 @@ Bins bins_of(const Log& log, double finest_s) {
   const bool rippled = in.sampled_A != in.amplitude_A;
   const double to_speed = moved_towards_speed(in, out.current_noise_A);
   if (!rippled) in.sampled_A = in.amplitude_A;
+  in.enabled = enabled(in, out.current_noise_A);
   out.noisy_share = 1 - to_speed;
   // What rest shows flows, or is the sensor's: half of it is taken for heat, and fits average over the other (leeway).
   // Of the square of a current that was moved, noise left less than nothing.

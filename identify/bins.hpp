@@ -72,7 +72,8 @@ struct Bins {
 Bins bins_of(const Log& log, double finest_s);
 
 /// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. `sampled_A`: amplitude
-/// with the sign of its torque, without ripple where that is known. Speed mechanical.
+/// with the sign of its torque, without ripple where that is known. Speed mechanical. Whether the bridge is on is left
+/// to who knows it.
 void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, double speed_rad_per_s);
 
 /// Takes the readings before a bin away; what they said of the start stays.

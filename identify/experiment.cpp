@@ -96,6 +96,7 @@ Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, dou
       bin.housing_at = bin.core_at = 0.5f;
       bin.housing_n = static_cast<float>(housing_n);
       bin.idle = step.current_A == 0 && step.speed_rad_per_s == 0;
+      in[thermal::Drive::enabled] = bin.idle ? 0 : 1;
       since_core_s += out.width_s;
       if (out.has_core && since_core_s >= 30) bin.core_n = 1, since_core_s = 0;
       out.bins.push_back(bin);

@@ -175,6 +175,22 @@ TEST(Bins, AJumpOfACoarseSensorIsNoNoise) {
   EXPECT_LT(identify::bins_of(log, 1).housing_noise_K, 0.15) << "0.73 with the jump";
 }
 
+TEST(Bins, ASensorsOffsetAndNoiseAtRestSwitchNoBridgeOn) {
+  identify::Log log;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const double current_A[] = {0, 6, 0.3, 0}, speed_rad_per_s[] = {0, 300, 0, 30};  // rest, load, a light hold, a spin
+  for (int i = 0; i < 400; ++i) {
+    log.of(identify::Role::time).push_back(i);
+    log.of(identify::Role::current).push_back(current_A[i / 100] + 0.005 + 0.02 * normal(random));
+    log.of(identify::Role::speed).push_back(speed_rad_per_s[i / 100] + 0.05 * normal(random));
+    log.of(identify::Role::housing).push_back(25);
+  }
+  const identify::Bins bins = identify::bins_of(log, 1);
+  for (std::size_t k = 0; k < 400; ++k)
+    EXPECT_EQ(bins.bins[k].input[thermal::Drive::enabled], k < 100 ? 0 : 1) << "at " << k << " s";
+}
+
 TEST(Bins, WhatIsMergedBeginsAgainWhereTheLogDoes) {
   identify::Bins log;
   log.width_s = 1;
