@@ -462,12 +462,20 @@ Role heat_of(const Log& log) {
 }
 
 double first_degC(const Log& log) {
-  for (const Role role : {Role::housing, Role::core}) {
-    for (const double x : log.of(role)) {
-      if (!std::isnan(x)) return x;
+  const Role sensor = count_told(log.of(Role::housing)) > 0 ? Role::housing : Role::core;
+  constexpr double hardly = 0.05;  // of the most: a 400th of its heat
+  std::size_t rest = log.of(Role::time).size();
+  for (const Role role : {heat_of(log), Role::speed}) {
+    const double most = hardly * largest_magnitude(log.of(role));
+    for (std::size_t i = 0; i < log.of(role).size(); ++i) {
+      if (std::abs(log.of(role)[i]) > most) rest = std::min(rest, i);
     }
   }
-  return missing;
+  double sum = 0, n = 0;
+  for (std::size_t i = 0; i < log.of(sensor).size() && (i < rest || n == 0); ++i) {
+    if (!std::isnan(log.of(sensor)[i])) sum += log.of(sensor)[i], n += 1;
+  }
+  return n > 0 ? sum / n : missing;
 }
 
 Log without_last(Log log, double fraction) {

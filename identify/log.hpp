@@ -88,7 +88,8 @@ bool resumes(const Log& log, double after_s, double until_s);
 /// What tells the heat: a power, else a current; iq of currents along two axes.
 Role heat_of(const Log& log);
 
-/// The housing's, or else the winding's, first reading; NaN: none.
+/// What the housing, or else the winding, shows before anything flows or turns, on average; its first reading where
+/// something does at once; NaN: none.
 double first_degC(const Log& log);
 
 /// The rows before the last `fraction` of the log's time.

@@ -191,6 +191,22 @@ TEST(Bins, ASensorsOffsetAndNoiseAtRestSwitchNoBridgeOn) {
     EXPECT_EQ(bins.bins[k].input[thermal::Drive::enabled], k < 100 ? 0 : 1) << "at " << k << " s";
 }
 
+TEST(Bins, WithoutAnAmbientTheSinkIsWhatAllOfTheFirstRestShows) {
+  identify::Log log;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 400; ++i) {
+    log.of(identify::Role::time).push_back(i);
+    log.of(identify::Role::current).push_back((i < 100 || i > 300 ? 0 : 6) + 0.02 * normal(random));
+    log.of(identify::Role::housing).push_back(25 + std::max(0, i - 100) + 0.5 * normal(random));
+  }
+  log.of(identify::Role::housing).front() = 26;
+  const auto sink_degC = [&] { return identify::bins_of(log, 1).bins.front().input.boundary_degC[0]; };
+  EXPECT_NEAR(sink_degC(), 25, 0.15) << "26 by the first reading alone";
+  log.of(identify::Role::current).front() = 6;
+  EXPECT_EQ(sink_degC(), 26) << "what warms from the start tells nothing more";
+}
+
 TEST(Bins, WhatIsMergedBeginsAgainWhereTheLogDoes) {
   identify::Bins log;
   log.width_s = 1;
