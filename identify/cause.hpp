@@ -3,7 +3,6 @@
 // parameters, its words, and what tells it from others. The table stands in causes.cpp; adding a cause is one entry.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 

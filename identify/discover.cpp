@@ -12,6 +12,7 @@
 #include "identify/held_out.hpp"
 #include "identify/model_file.hpp"
 #include "identify/refusals.hpp"
+#include "identify/search.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "identify/baseline.hpp"
-#include "identify/search.hpp"
 
 namespace identify {
 

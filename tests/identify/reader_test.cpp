@@ -12,7 +12,6 @@
 #include "identify/log.hpp"
 #include "identify/masks.hpp"
 #include "identify/units.hpp"
-#include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {

@@ -11,7 +11,7 @@
 
 namespace tests {
 
-enum class Outcome { right, wrong, tied_right, tied_wrong, silent, unknown, count };
+enum class Outcome { right, wrong, tied_right, tied_wrong, silent, unknown };
 
 struct CaseOptions {
   HiddenLogOptions log;
