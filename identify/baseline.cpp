@@ -146,7 +146,7 @@ std::string core_refusal(const Problem& problem, const Fit& f) {
 
 Fit fit_baseline(const Problem& problem) {
   Fit f = fit(problem, {});
-  if (f.x.size() == 0) {
+  if (!f.valid()) {
     throw wire::pc::UserError(wire::pc::Exit::unusable,
                               problem.logs.front().name +
                                   ": no motor near this sheet could be so heated and stay so cool; check the units of "

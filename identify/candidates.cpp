@@ -97,7 +97,7 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
     Fit anew = fit(rough, alone);
     if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
   });
-  std::erase_if(fits, [](const Fit& f) { return f.x.size() == 0; });
+  std::erase_if(fits, [](const Fit& f) { return !f.valid(); });
   Candidate rough_base = base;
   if (shorter) rough_base.fit = fit(rough, {}, {&base.fit});
   double most = 0;
@@ -107,7 +107,7 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
     out[i] = candidate(rough_base, std::move(fits[i]));
     if (!shorter || out[i].gain < most - look_errs - look_errs_share * most) return;
     Fit whole = fit(problem, out[i].fit.chosen, {&out[i].fit});
-    if (whole.x.size() > 0) out[i] = candidate(base, std::move(whole));
+    if (whole.valid()) out[i] = candidate(base, std::move(whole));
   });
   sort(out);
   return out;
@@ -138,9 +138,9 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
     looks[i] = fit(rough, pair.set, {pair.better, pair.other}, look_steps);
     if (!pair.anew) return;
     Fit anew = fit(rough, pair.set, {pair.better}, look_steps);
-    if (anew.x.size() > 0 && (looks[i].x.size() == 0 || hoped(anew) < hoped(looks[i]))) looks[i] = std::move(anew);
+    if (anew.valid() && (!looks[i].valid() || hoped(anew) < hoped(looks[i]))) looks[i] = std::move(anew);
   });
-  std::erase_if(looks, [](const Fit& f) { return f.x.size() == 0; });
+  std::erase_if(looks, [](const Fit& f) { return !f.valid(); });
   const auto order = [&] {
     std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
   };
@@ -194,7 +194,7 @@ void start_singles_again(const Problem& problem, Field& field) {
   }
   in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
   for (Again& again : all) {
-    if (again.fit.x.size() == 0) continue;
+    if (!again.fit.valid()) continue;
     Candidate anew = candidate(field.base, std::move(again.fit));
     if (anew.gain > again.alone->gain) *again.alone = std::move(anew);
   }
@@ -226,7 +226,7 @@ std::vector<Chosen> available(const Problem& problem, const std::vector<std::str
 
 void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& field) {
   Candidate base;
-  base.fit = field.base.fit.x.size() == 0 ? fit(problem, {}) : fit(problem, {}, {&field.base.fit});
+  base.fit = field.base.fit.valid() ? fit(problem, {}, {&field.base.fit}) : fit(problem, {});
   base.ratio = base.fit.ratio();
   field.base = std::move(base);
   field.singles = singles_of(problem, all, field.base, field.singles);
@@ -262,10 +262,10 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
   in_parallel(all.size(), [&](std::size_t i) {
     Neighbour& n = all[i];
     n.fit = fit(rough, n.pair, {&best.fit, n.other});
-    if (shorter) n.fit = n.fit.x.size() > 0 && n.fit.surprise() < near ? fit(problem, n.pair, {&n.fit}) : Fit{};
+    if (shorter) n.fit = n.fit.valid() && n.fit.surprise() < near ? fit(problem, n.pair, {&n.fit}) : Fit{};
   });
   for (Neighbour& n : all) {
-    if (n.fit.x.size() > 0) sets.push_back(candidate(field.base, std::move(n.fit)));
+    if (n.fit.valid()) sets.push_back(candidate(field.base, std::move(n.fit)));
   }
   sort(sets);
 }

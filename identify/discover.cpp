@@ -319,7 +319,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   std::optional<Fit> nearest;
   if (poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty()) nearest = found.chosen.fit;
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
-  const Fit two = found.base.fit.x.size() > 0 ? found.base.fit : base;
+  const Fit two = found.base.fit.valid() ? found.base.fit : base;
   judge_baseline(problem, two, logs, motor, report);
   if (!extended) found.chosen.fit = two;
   if (!poor.empty()) {

@@ -52,7 +52,7 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
     for (double factor = 1; factor < 1667; factor *= 1.6) {
       disturbed.noise.disturbance_K = factor * least_K;
       Fit f = fit(disturbed, undisturbed.chosen, {&warm}, 10);
-      if (f.x.size() == 0) break;
+      if (!f.valid()) break;
       const double reached = evidence(disturbed, f);
       tried[i].push_back({disturbed.noise, reached - own, reached});
       most = std::max(most, reached);

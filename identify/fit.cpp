@@ -446,7 +446,7 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   }
   if (last_is_known) {
     Fit best = descend(problem, averaged, chosen, c, x, most);
-    if (warm.size() > 0 || best.x.size() == 0) return best;
+    if (warm.size() > 0 || !best.valid()) return best;
     const auto start_at = [&](const Eigen::VectorXd& other) {
       Fit f = descend(problem, averaged, chosen, c, other, most);
       if (f.cost < best.cost) best = std::move(f);
@@ -478,9 +478,9 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
     for (const auto& start : starts) {
       for (std::size_t p = 0; p < start.size(); ++p) from[last + static_cast<Eigen::Index>(p)] = start[p];
       Fit f = descend(problem, averaged, chosen, c, from, starts.size() > 1 ? std::min(look, most) : most);
-      if (f.x.size() > 0 && (best.x.size() == 0 || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
+      if (f.valid() && (!best.valid() || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
     }
-    if (best.settled || best.x.size() == 0 || starts.size() == 1) return best;
+    if (best.settled || !best.valid() || starts.size() == 1) return best;
     return descend(problem, averaged, chosen, c, best.x, most);
   };
   Fit best = fitted_from(x);

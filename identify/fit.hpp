@@ -30,6 +30,7 @@ struct Fit {
   double promise = 0;    // what a full step would still take from the cost, were the model linear
   std::vector<bool> at_bound;
 
+  bool valid() const { return x.size() > 0; }  // false: nothing could be simulated, and the rest says nothing
   int cause_coordinates() const;
   /// Of coordinates, from the data and the prior; those at a bound count as known where `bounds_hold`.
   Eigen::MatrixXd covariance(bool bounds_hold = true) const;
@@ -41,7 +42,7 @@ struct Fit {
 /// Fits with the causes `chosen`, two at most. The first of `warm` gives base and initial coordinates; each cause
 /// starts from its parameters in the first of them that has it. A last cause that none has starts near nothing, and,
 /// where it is nonlinear in its parameters, from several places; without warm and motor file from a usual motor, too.
-/// `most`: Newton steps; few are a look at what the causes promise.
+/// `most`: Newton steps; few are a look at what the causes promise. Not valid() where no start can be simulated.
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 

@@ -161,7 +161,7 @@ HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldO
 std::string veto(const Problem& problem, const Fit& base, const Fit& extended) {
   const Problem first = first_part(problem, veto_share), last = last_part(problem, veto_share);
   const Fit two = fit(first, {}, {&base}), more = fit(first, extended.chosen, {&extended});
-  if (two.x.size() == 0 || more.x.size() == 0) return "";
+  if (!two.valid() || !more.valid()) return "";
   auto blocks = blocks_of(last, two, more, problem.any_core());
   if (blocks.size() < least_blocks) blocks = blocks_of(last, two, more, false);
   if (blocks.size() < least_blocks) return "";

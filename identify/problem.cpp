@@ -180,7 +180,7 @@ void rough_search(Problem& whole) {
       b.C1_J_per_K = 0.02 * housing_s / b.R1_K_per_W;
       problem.belief = b;
       const Fit f = fit(problem, {});
-      if (f.cost >= least || f.x.size() == 0) continue;
+      if (f.cost >= least || !f.valid()) continue;
       least = f.cost;
       best = centred_at(b, f);
     }
@@ -196,7 +196,7 @@ void rough_search(Problem& whole) {
 /// move there by more than it is noisy: a quarter of the winding's time constant. Infinite where it does not.
 double felt_winding_bin_s(const Problem& problem) {
   const Fit felt = fit(problem, {{cause_named("sensor_placement"), -1}});
-  if (felt.x.size() == 0) return std::numeric_limits<double>::infinity();
+  if (!felt.valid()) return std::numeric_limits<double>::infinity();
   const Physical p = physical(felt.x);
   const double ohm = problem.heated_by_power() ? 1 : problem.belief.ohm, share = felt.x[base_count];
   const double white_K = problem.noise.housing_white_K;

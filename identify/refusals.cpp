@@ -249,7 +249,7 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
     Problem one = problem;
     one.logs = {problem.logs[l]};
     const Fit alone = fit(one, {});
-    if (alone.x.size() > 0 && determines_housing(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
+    if (alone.valid() && determines_housing(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
   }
   // Two resistors that miss much may see no cooling, or a slow one, where the causes found let it be seen.
   const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;

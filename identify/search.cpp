@@ -37,7 +37,7 @@ double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
 double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen, const Fit& warm) {
   const Problem first = first_part(problem, 0.25);
   const Fit f = fit(first, chosen, {&warm});
-  if (f.x.size() == 0) return 1e300;
+  if (!f.valid()) return 1e300;
   const Rmse e = rmse_of(last_part(problem, 0.25), f);
   return std::isnan(e.core_K) ? e.housing_K : e.core_K;
 }
@@ -314,7 +314,7 @@ void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
     const Problem less = believed_less(judged, f.chosen, 1);
     Fit anew = fit(less, f.chosen);
     f = fit(less, f.chosen, {&f});
-    if (anew.x.size() > 0 && (f.x.size() == 0 || anew.cost < f.cost)) f = std::move(anew);
+    if (anew.valid() && (!f.valid() || anew.cost < f.cost)) f = std::move(anew);
   };
   refit(out.base.fit);
   refit(out.chosen.fit);

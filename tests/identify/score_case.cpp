@@ -133,7 +133,7 @@ double separability(const Problem& clean, const std::vector<std::string>& truth,
       if (one_slot || std::string(x.id) == y.id || identify::ids_of(pair) == truth) continue;
       constexpr int look_steps = 3, most_steps = 20;
       const Fit look = identify::fit(clean, pair, {&singles[a], &singles[b]}, look_steps);
-      if (look.x.size() == 0 || 2 * (look.misfit - 2 * look.promise) > D) continue;
+      if (!look.valid() || 2 * (look.misfit - 2 * look.promise) > D) continue;
       D = std::min(D, 2 * identify::fit(clean, pair, {&look}, most_steps).misfit);
     }
   }
