@@ -43,7 +43,7 @@ std::string in_words(const Loose& loose) {
 Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
   Error housing{missing, missing, 0}, core{missing, missing, 0};
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed r = replayed(problem, f, static_cast<int>(l));
+    const Replayed r = replayed(problem, f, l);
     const Error h = error_of(r.housing_residual_K), c = error_of(r.core_residual_K);
     if (each != nullptr) each->push_back({h.rms_K, c.rms_K, h.worst_K, c.worst_K});
     housing = joined(housing, h);
@@ -55,7 +55,7 @@ Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
 void add_plots(const Problem& problem, const Fit& f, const std::string& remark, Report& report) {
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
-    const Replayed r = replayed(problem, f, static_cast<int>(l));
+    const Replayed r = replayed(problem, f, l);
     LogPlot plot;
     plot.name = std::filesystem::path(log.name).filename().string() + remark;
     plot.heat_label = problem.heated_by_power() ? "power, W" : "current, A";
@@ -77,7 +77,7 @@ void add_plots(const Problem& problem, const Fit& f, const std::string& remark, 
 
 void add_extended(const Problem& problem, const Fit& f, Report& report, std::size_t first) {
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    Replayed r = replayed(problem, f, static_cast<int>(l));
+    Replayed r = replayed(problem, f, l);
     report.plots[first + l].extended_housing = std::move(r.housing_degC);
     report.plots[first + l].extended_core = std::move(r.core_degC);
   }

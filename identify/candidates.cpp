@@ -52,7 +52,7 @@ Problem coarse(const Problem& problem, const Fit& best) {
   for (std::size_t l = 0; l < out.logs.size(); ++l) {
     Bins& log = out.logs[l];
     Bins simulated = log;
-    const Replayed fine = replayed(problem, best, static_cast<int>(l));
+    const Replayed fine = replayed(problem, best, l);
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       simulated.bins[k].housing_degC = fine.housing_degC[k];
       simulated.bins[k].core_degC = fine.core_degC[k];
@@ -73,7 +73,7 @@ Problem coarse(const Problem& problem, const Fit& best) {
     }
     log = merged(log, together);
     simulated = merged(simulated, together);
-    const Replayed rough = replayed(out, best, static_cast<int>(l));
+    const Replayed rough = replayed(out, best, l);
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       log.bins[k].housing_degC += rough.housing_degC[k] - simulated.bins[k].housing_degC;
       log.bins[k].core_degC += rough.core_degC[k] - simulated.bins[k].core_degC;

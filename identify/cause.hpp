@@ -94,8 +94,9 @@ inline const Cause& cause_of(const Chosen& chosen) { return causes()[static_cast
 
 /// Edits `model` by `cause` with parameters `k` in physical units. `log`: which log the model replays.
 template <class S>
-void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<S>& model) {
+void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log, Model<S>& model) {
   auto& set = model.set;
+  const bool here = chosen.log == static_cast<int>(log);
   const auto ambient = set.links[model.sink_link].to;
   const auto add_link = [&](int from, int to, thermal::LinkLaw law, const S& conductance) {
     set.links[set.link_count++] = {static_cast<std::int8_t>(from), static_cast<std::int8_t>(to), law, conductance,
@@ -149,11 +150,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, int log, Model<
       model.cooling_changes = true;
       break;
     case Edit::cooling_of_log:
-      if (chosen.log == log)
-        set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
+      if (here) set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
       break;
     case Edit::power_of_log:
-      for (int s = 0; chosen.log == log && s < set.source_count; ++s) {
+      for (int s = 0; here && s < set.source_count; ++s) {
         if (set.sources[s].drive == thermal::Drive::power_W) set.sources[s].gain = set.sources[s].gain * k[0];
       }
       break;

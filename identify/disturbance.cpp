@@ -80,7 +80,7 @@ void refine_core_noise(Problem& problem, const Fit& best) {
   double sum = 0;
   int n = 0;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    for (const double r : replayed(problem, best, static_cast<int>(l)).core_residual_K) {
+    for (const double r : replayed(problem, best, l).core_residual_K) {
       if (!std::isnan(r)) sum += r * r, ++n;
     }
   }

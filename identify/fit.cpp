@@ -63,7 +63,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
 
 /// What simulates log `l` at coordinates x; local directions: base, causes, then the two of a start.
 template <class S>
-Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, int l) {
+Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, std::size_t l) {
   using std::exp;
   const Belief& belief = problem.belief;
   Model<S> m;
@@ -163,7 +163,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
       const auto housing0 = Dual<N>::variable(x[at], shared), excess = Dual<N>::variable(x[at + 1], shared + 1);
       initial.push_back({housing0 + excess, housing0});
     }
-    const auto model = build<Dual<N>>(problem, chosen, local, static_cast<int>(l));
+    const auto model = build<Dual<N>>(problem, chosen, local, l);
     Sums<N> sums;
     const auto take_sums = [&] {
       const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
@@ -363,7 +363,7 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
 double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s, double high_s) {
   constexpr double apart_s = 1;
   std::vector<Replayed> simulated;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) simulated.push_back(replayed(problem, prompt, l));
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) simulated.push_back(replayed(problem, prompt, l));
   double least = 1e300, out_s = 0;
   for (double delay_s = low_s; delay_s <= high_s; delay_s += apart_s) {
     double sum = 0;
@@ -383,16 +383,16 @@ double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s
 }
 
 /// Where a log's own coordinates stand.
-Eigen::Index initial_of(const Problem& problem, const Fit& f, int log) {
+Eigen::Index initial_of(const Problem& problem, const Fit& f, std::size_t log) {
   Eigen::Index at = f.x.size();
-  for (std::size_t l = problem.logs.size(); l-- > static_cast<std::size_t>(log);) at -= own_count(problem.logs[l]);
+  for (std::size_t l = problem.logs.size(); l-- > log;) at -= own_count(problem.logs[l]);
   return at;
 }
 
-std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, int log) {
+std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, std::size_t log) {
   std::vector<Initial<double>> out;
   Eigen::Index at = initial_of(problem, f, log);
-  for (std::size_t s = 0; s < problem.logs[static_cast<std::size_t>(log)].starts.size(); ++s, at += per_start_count)
+  for (std::size_t s = 0; s < problem.logs[log].starts.size(); ++s, at += per_start_count)
     out.push_back({f.x[at] + f.x[at + 1], f.x[at]});
   return out;
 }
@@ -534,8 +534,8 @@ Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f) {
   for (Eigen::Index i = 0; i < out.x.size(); ++i) out.x[i] = c[static_cast<std::size_t>(i)].start;
   const Eigen::Index shared = base_count + f.cause_coordinates();
   out.x.head(shared) = f.x.head(shared);
-  for (int l = 0; l < static_cast<int>(whole.logs.size()); ++l) {
-    const auto& starts = fitted.logs[static_cast<std::size_t>(l)].starts;
+  for (std::size_t l = 0; l < whole.logs.size(); ++l) {
+    const auto& starts = fitted.logs[l].starts;
     for (std::size_t s = 0; s < starts.size(); ++s) {
       if (s > 0 && std::isnan(starts[s].housing_degC) && std::isnan(starts[s].core_degC)) continue;
       const auto at = per_start_count * static_cast<Eigen::Index>(s);
@@ -553,14 +553,14 @@ double parameter_value(const Problem& problem, const Cause& cause, int p, double
   return (parameter.logarithmic ? std::exp(coordinate) : coordinate) * problem.scale(parameter.scale, cause.drive);
 }
 
-Model<double> model_of(const Problem& problem, const Fit& f, int log) {
+Model<double> model_of(const Problem& problem, const Fit& f, std::size_t log) {
   auto model = build<double>(problem, f.chosen, f.x.data(), log);
   model.uneven_per_A2 = f.uneven_per_A2;
   return model;
 }
 
-Replayed replayed(const Problem& problem, const Fit& f, int l) {
-  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+Replayed replayed(const Problem& problem, const Fit& f, std::size_t l) {
+  const Bins& log = problem.logs[l];
   const auto model = model_of(problem, f, l);
   Replayed out;
   Whitener white =
@@ -588,8 +588,8 @@ Replayed replayed(const Problem& problem, const Fit& f, int l) {
   return out;
 }
 
-double hottest_degC(const Problem& problem, const Fit& f, int l) {
-  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+double hottest_degC(const Problem& problem, const Fit& f, std::size_t l) {
+  const Bins& log = problem.logs[l];
   auto part = model_of(problem, f, l);
   const int hot = part.hot_node;
   const auto initial = initial_states(problem, f, l);

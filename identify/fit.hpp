@@ -64,10 +64,10 @@ struct Replayed {
   std::vector<double> housing_residual_K, core_residual_K;  // measured - simulated, NaN where nothing was measured
   std::vector<double> whitened;  // residual of the housing (of a winding read alone), whitened, NaN likewise
 };
-Replayed replayed(const Problem& problem, const Fit& fit, int log);
+Replayed replayed(const Problem& problem, const Fit& fit, std::size_t log);
 
 /// The most that any part of the winding becomes, degC.
-double hottest_degC(const Problem& problem, const Fit& fit, int log);
+double hottest_degC(const Problem& problem, const Fit& fit, std::size_t log);
 
 /// Root mean square and worst of the residuals; NaN when there is no reading.
 struct Error {
@@ -85,7 +85,7 @@ Physical physical(const Eigen::VectorXd& x);
 /// Coordinates into physical units, for parameter p of a chosen cause.
 double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate);
 
-Model<double> model_of(const Problem& problem, const Fit& fit, int log);
+Model<double> model_of(const Problem& problem, const Fit& fit, std::size_t log);
 
 /// Misfit at given coordinates, and its gradient (tests compare it with differences of the former).
 double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,

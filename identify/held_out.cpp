@@ -28,8 +28,7 @@ struct Block {
 std::vector<Block> blocks_of(const Problem& problem, const Fit& base, const Fit& extended, bool winding) {
   std::vector<Block> out;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed a = replayed(problem, base, static_cast<int>(l)),
-                   b = replayed(problem, extended, static_cast<int>(l));
+    const Replayed a = replayed(problem, base, l), b = replayed(problem, extended, l);
     const auto& before = winding ? a.core_residual_K : a.housing_residual_K;
     const auto& after = winding ? b.core_residual_K : b.housing_residual_K;
     const auto length = static_cast<std::size_t>(std::max(1.0, std::ceil(block_s / problem.logs[l].width_s)));

@@ -82,13 +82,13 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   }
   Leeway lateness, frame, phases, moment, ripple;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
                    warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l),
                    heated = replayed(rippling, motor, l);
     const Replayed& at_once = sensor ? plain : even;
-    const double moment_s = problem.logs[static_cast<std::size_t>(l)].interval_s * ordinary_moment_share;
+    const double moment_s = problem.logs[l].interval_s * ordinary_moment_share;
     lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
@@ -124,7 +124,7 @@ Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
     }
   }
   Leeway out;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), moved = replayed(bent, two_resistors, l);
     out.housing_K.push_back(apart_K(moved.housing_degC, plain.housing_degC));
     out.core_K.push_back(apart_K(moved.core_degC, plain.core_degC));

@@ -33,7 +33,7 @@ Eigen::MatrixXd doubts(const Fit& f) {
 Model<double> hottest_model_of(const Problem& problem, const Fit& f) {
   Model<double> hottest;
   double most_K_per_drive = -1;
-  for (int l = 0; l < static_cast<int>(problem.logs.size()); ++l) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     Model<double> m = model_of(problem, f, l);
     double& sink_W_per_K = m.set.links[m.sink_link].conductance_W_per_K;
     if (m.cooling_changes) sink_W_per_K *= std::min(1.0, m.cooling_factor);

@@ -176,7 +176,7 @@ double left_open_K(const Problem& problem, const Fit& base, const std::vector<Lo
   double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
-    const auto run = [&](const Problem& p) { return replayed(p, base, static_cast<int>(l)).*of; };
+    const auto run = [&](const Problem& p) { return replayed(p, base, l).*of; };
     const std::vector<double> line = run(problem), a = run(last), b = run(next), c = run(sooner);
     for (std::size_t k = 0; k < line.size(); ++k) {
       // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.

@@ -74,7 +74,7 @@ std::string picture(const Report& r, std::size_t l) {
   }
   residual.levels.push_back({0, ""});
   for (const Wrong& w : r.structure.wrong) {
-    if (static_cast<std::size_t>(w.log) != l) continue;
+    if (w.log != l) continue;
     if ((w.channel == "winding") != winding) continue;  // one channel's stretches: two layers of tint hide each other
     // A label is as wide as a tenth of the picture: on a narrower stretch it would run into its neighbour.
     const bool wide = w.to_s - w.from_s > 0.09 * p.time_s.back();
@@ -184,7 +184,7 @@ std::string worth(const Report& r) {
 std::string where(const Report& r) {
   std::string s = "<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
   for (const Wrong& w : r.structure.wrong) {
-    s += row({(r.plots.size() > 1 ? escaped(r.plots[static_cast<std::size_t>(w.log)].name) + ", " : "") +
+    s += row({(r.plots.size() > 1 ? escaped(r.plots[w.log].name) + ", " : "") +
                   fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),
               w.channel,
               fmt::format("{:.2f} K {}", std::abs(w.mean_K),

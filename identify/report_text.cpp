@@ -57,8 +57,8 @@ std::string where(const Report& r) {
   if (r.structure.wrong.empty()) s += "  no stretch stands out\n";
   for (const Wrong& w : r.structure.wrong) {
     s += fmt::format("  {}{:.0f}..{:.0f} s: {} is {:.2f} K {} than simulated; goes with {}\n",
-                     r.plots.size() > 1 ? r.plots[static_cast<std::size_t>(w.log)].name + " " : "", w.from_s, w.to_s,
-                     w.channel, std::abs(w.mean_K), w.mean_K > 0 ? "hotter" : "cooler", w.goes_with);
+                     r.plots.size() > 1 ? r.plots[w.log].name + " " : "", w.from_s, w.to_s, w.channel,
+                     std::abs(w.mean_K), w.mean_K > 0 ? "hotter" : "cooler", w.goes_with);
   }
   std::string strongest;
   for (std::size_t i = 0; i < std::min<std::size_t>(4, r.structure.relations.size()); ++i) {

@@ -23,7 +23,7 @@ double of_current_K(const Problem& problem, const Margins& margins) {
 double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
   double core = 0, housing = 0, n = 0;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed x = replayed(problem, a, static_cast<int>(l)), y = replayed(problem, b, static_cast<int>(l));
+    const Replayed x = replayed(problem, a, l), y = replayed(problem, b, l);
     for (std::size_t k = 0; k < x.core_degC.size(); ++k) {
       core += std::pow(x.core_degC[k] - y.core_degC[k], 2);
       housing += std::pow(x.housing_degC[k] - y.housing_degC[k], 2);

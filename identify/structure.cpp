@@ -142,9 +142,9 @@ std::string unusual_in(const Bins& log, std::size_t from, std::size_t to, const 
 
 /// Appends the stretches of log `l` where the residual's running mean stays on one side, beyond `slow_K` and what white
 /// noise of `white_K` a reading leaves in it.
-void find_wrong(const Problem& problem, int l, const char* channel, const std::vector<double>& residual, double slow_K,
-                double white_K, const std::vector<Signal>& all, std::vector<Wrong>& out) {
-  const Bins& log = problem.logs[static_cast<std::size_t>(l)];
+void find_wrong(const Problem& problem, std::size_t l, const char* channel, const std::vector<double>& residual,
+                double slow_K, double white_K, const std::vector<Signal>& all, std::vector<Wrong>& out) {
+  const Bins& log = problem.logs[l];
   const std::size_t n = residual.size();
   std::vector<double> sum(n + 1, 0), count(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
@@ -206,7 +206,7 @@ Structure structure(const Problem& problem, const Fit& f) {
   };
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
-    const Replayed r = replayed(problem, f, static_cast<int>(l));
+    const Replayed r = replayed(problem, f, l);
     append(whitened, r.whitened);
     append(residual, log.has_housing ? r.housing_residual_K : r.core_residual_K);
     for (std::size_t k = 0; k < log.bins.size(); ++k)
@@ -219,11 +219,9 @@ Structure structure(const Problem& problem, const Fit& f) {
     }
     const double slow_K = std::max(0.1, 3 * problem.noise.housing_slow_K);
     if (log.has_housing)
-      find_wrong(problem, static_cast<int>(l), "housing", r.housing_residual_K, slow_K, problem.noise.housing_white_K,
-                 all, out.wrong);
+      find_wrong(problem, l, "housing", r.housing_residual_K, slow_K, problem.noise.housing_white_K, all, out.wrong);
     if (log.has_core)
-      find_wrong(problem, static_cast<int>(l), "winding", r.core_residual_K, 3 * slow_K, problem.noise.core_white_K,
-                 all, out.wrong);
+      find_wrong(problem, l, "winding", r.core_residual_K, 3 * slow_K, problem.noise.core_white_K, all, out.wrong);
   }
   out.residual = whiteness(whitened);
   for (std::size_t s = 0; s < all.size(); ++s) {

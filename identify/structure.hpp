@@ -24,7 +24,7 @@ struct Relation {
 
 /// A stretch of one log where the simulation is off in one direction. mean_K > 0: measured is hotter than simulated.
 struct Wrong {
-  int log;
+  std::size_t log;
   std::string channel;  // "housing" or "winding"
   double from_s, to_s, mean_K;
   std::string goes_with;
