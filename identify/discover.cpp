@@ -26,8 +26,6 @@ bool holds(const std::vector<std::string>& ids, const std::string& id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
 
-bool named_clearly(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
-
 /// Every cause once, best first, though a cause of one log was tried in each of them.
 std::vector<Rung> ladder_of(const Search& found) {
   std::vector<Rung> out;
@@ -35,7 +33,7 @@ std::vector<Rung> ladder_of(const Search& found) {
   for (const Candidate& c : found.singles) {
     const std::string id = ids_of(c.fit.chosen).front();
     if (!seen.insert(id).second) continue;
-    const bool chosen = named_clearly(found.verdict) && !found.tied.empty() && holds(found.tied.front(), id);
+    const bool chosen = names_causes(found.verdict) && !found.tied.empty() && holds(found.tied.front(), id);
     const bool tied =
         found.verdict == Verdict::ambiguous &&
         std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
@@ -66,7 +64,7 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
   report.ladder = ladder_of(found);
-  if (!named_clearly(found.verdict) && found.verdict != Verdict::ambiguous) return;
+  if (!names_causes(found.verdict) && found.verdict != Verdict::ambiguous) return;
   const Fit& f = found.chosen.fit;
   for (std::size_t i = 0; i < f.chosen.size(); ++i) {
     const Cause& cause = cause_of(f.chosen[i]);

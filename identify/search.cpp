@@ -405,7 +405,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   }
   refit_for_the_board(judged, margins, out);
   const std::string beyond = at_a_bound(out.chosen.fit);
-  if (!beyond.empty() && (out.verdict == Verdict::explained || out.verdict == Verdict::partly_explained)) {
+  if (!beyond.empty() && names_causes(out.verdict)) {
     out.verdict = Verdict::unknown_cause;
     out.steps.push_back(
         fmt::format("Yet the {} in {} would have to lie beyond its bound: none of the known causes "

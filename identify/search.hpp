@@ -62,6 +62,8 @@ struct Margins {
 
 enum class Verdict { adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient };
 const char* word(Verdict verdict);
+/// Of the whole or of most of it.
+inline bool names_causes(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
 
 struct Search {
   Candidate base;

@@ -170,7 +170,7 @@ std::string joined(const std::vector<std::string>& ids) {
   return out;
 }
 
-bool CaseResult::named() const { return verdict == Verdict::explained || verdict == Verdict::partly_explained; }
+bool CaseResult::named() const { return identify::names_causes(verdict); }
 
 Outcome CaseResult::outcome_for(const std::vector<std::string>& ids) const {
   const bool among = std::find(answer.begin(), answer.end(), ids) != answer.end();

@@ -62,9 +62,7 @@ Hidden hidden(const std::vector<std::string>& effects, std::uint64_t seed, tests
   return hidden(o);
 }
 
-bool names(const identify::Search& s) {
-  return s.verdict == Verdict::explained || s.verdict == Verdict::partly_explained;
-}
+bool names(const identify::Search& s) { return identify::names_causes(s.verdict); }
 
 /// `otherwise`: what it was called before.
 void expect_named(const tests::HiddenLogOptions& o, const char* otherwise) {
