@@ -82,12 +82,16 @@ Problem coarse(const Problem& problem, const Fit& best) {
   return out;
 }
 
+bool is_shorter(const Problem& rough, const Problem& problem) {
+  return rough.logs.front().bins.size() < problem.logs.front().bins.size();
+}
+
 /// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
 /// into a poor valley by what is missing. Of a long log those far behind are left as its longer bins show them.
 std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
                                   const std::vector<Candidate>& before) {
   const Problem rough = coarse(problem, base.fit);
-  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  const bool shorter = is_shorter(rough, problem);
   std::vector<Fit> fits(all.size());
   in_parallel(all.size(), [&](std::size_t i) {
     const std::vector<Chosen> alone = {all[i]};
@@ -145,7 +149,7 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
     std::sort(looks.begin(), looks.end(), [&](const Fit& a, const Fit& b) { return hoped(a) < hoped(b); });
   };
   order();
-  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  const bool shorter = is_shorter(rough, problem);
   if (shorter) {  // a fit to the end is cheap there, and leaves less to finish here
     looks.resize(std::min(most_finished, looks.size()));
     in_parallel(looks.size(), [&](std::size_t i) { looks[i] = fit(rough, looks[i].chosen, {&looks[i]}); });
@@ -257,7 +261,7 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
     }
   }
   const Problem rough = coarse(problem, best.fit);
-  const bool shorter = rough.logs.front().bins.size() < problem.logs.front().bins.size();
+  const bool shorter = is_shorter(rough, problem);
   const double near = fit(rough, best.fit.chosen, {&best.fit}).surprise() + look_errs + look_errs_share * best.gain;
   in_parallel(all.size(), [&](std::size_t i) {
     Neighbour& n = all[i];
