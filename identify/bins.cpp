@@ -353,9 +353,7 @@ Bins bins_of(const Log& log, double finest_s) {
   out.core_noise_K = reading_noise(log.of(Role::core));
 
   const auto& t = log.of(Role::time);
-  std::vector<double> spacing;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
-  const double usual_s = median(spacing);
+  const double usual_s = median(spacing(t));
   const auto refuse = [&](const std::string& what) {
     throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
   };

@@ -240,11 +240,10 @@ void check_epoch(const Log& log, double first_cell) {
 
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
   const auto& t = log.of(Role::time);
+  const std::vector<double> spacing_s = spacing(t);
   std::vector<std::size_t> falls;
-  std::vector<double> spacing_s;
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] < t[i - 1]) falls.push_back(i);
-    spacing_s.push_back(t[i] - t[i - 1]);
   }
   if (falls.empty()) return;
   constexpr double correction_s = 5;  // a clock that is set right by another jumps by less

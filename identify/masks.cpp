@@ -172,8 +172,7 @@ void note_missing_readings(Log& log) {
 
 void note_gaps(Log& log) {
   const auto& t = log.of(Role::time);
-  std::vector<double> spacing_s;
-  for (std::size_t i = 1; i < t.size(); ++i) spacing_s.push_back(t[i] - t[i - 1]);
+  const std::vector<double> spacing_s = spacing(t);
   const double usual_s = median(spacing_s);
   double lost_s = 0, held_s = 0;
   int gaps = 0;

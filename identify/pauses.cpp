@@ -85,8 +85,7 @@ Log part_of(const Log& log, std::size_t from, std::size_t to) {
 
 /// Where a pause ends, among the rows that tell the heat: those that come after far longer than both their neighbours.
 std::vector<std::size_t> ends_of_pauses(const std::vector<double>& told_s) {
-  std::vector<double> spacing_s;
-  for (std::size_t k = 1; k < told_s.size(); ++k) spacing_s.push_back(told_s[k] - told_s[k - 1]);
+  const std::vector<double> spacing_s = spacing(told_s);
   const double usual_s = median(spacing_s);
   std::vector<std::size_t> ends;
   for (std::size_t k = 0; k < spacing_s.size(); ++k) {

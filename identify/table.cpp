@@ -276,6 +276,12 @@ double largest_magnitude(const std::vector<double>& cells) {
   return most;
 }
 
+std::vector<double> spacing(const std::vector<double>& cells) {
+  std::vector<double> out;
+  for (std::size_t i = 1; i < cells.size(); ++i) out.push_back(cells[i] - cells[i - 1]);
+  return out;
+}
+
 int Table::find(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   return at == names.end() ? -1 : static_cast<int>(at - names.begin());

@@ -26,6 +26,9 @@ std::string_view trimmed(std::string_view s);
 std::size_t count_told(const std::vector<double>& cells);
 double largest_magnitude(const std::vector<double>& cells);
 
+/// From each cell to the next, one fewer.
+std::vector<double> spacing(const std::vector<double>& cells);
+
 struct Table {
   std::string file;
   std::vector<std::string> names;
