@@ -104,11 +104,10 @@ Inputs inputs_of(const Log& log, Bins& out) {
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
   in.speed_rad_per_s = log.has(Role::speed) ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);
 
-  const bool coolant = log.has(Role::coolant);
   std::vector<double> sink;
-  if (coolant || log.has(Role::ambient)) {
-    sink = bridged(log.of(coolant ? Role::coolant : Role::ambient), t);
-    if (coolant) out.notes.push_back("The coolant is taken as the sink.");
+  if (log.has(sink_of(log))) {
+    sink = bridged(log.of(sink_of(log)), t);
+    if (sink_of(log) == Role::coolant) out.notes.push_back("The coolant is taken as the sink.");
   } else {
     const double first = std::isnan(log.sink_degC) ? first_degC(log) : log.sink_degC;
     sink.assign(t.size(), first);

@@ -156,15 +156,13 @@ std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
 /// A room whose temperature was typed in, and warms, looks like a mass, a drift or another cooling.
 void note_typed_ambient(const std::vector<Log>& logs, Report& report) {
   const auto moves = [](const Log& log) {
-    const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
     double low = 1e300, high = -1e300;
-    for (const double x : sink) {
+    for (const double x : log.of(sink_of(log))) {
       if (!std::isnan(x)) low = std::min(low, x), high = std::max(high, x);
     }
     return high > low;
   };
-  const bool recorded = std::any_of(logs.begin(), logs.end(),
-                                    [](const Log& log) { return log.has(Role::ambient) || log.has(Role::coolant); });
+  const bool recorded = std::any_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(sink_of(log)); });
   if (recorded && std::none_of(logs.begin(), logs.end(), moves))
     report.notes.push_back(
         "The recorded ambient never moves; a room that warms unmeasured looks like a third mass, a drift or a "

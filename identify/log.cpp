@@ -151,8 +151,7 @@ double lowest(const std::vector<double>& v) {
 
 /// Units that a header did not tell: values that no motor shows.
 void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
-  for (const Role role :
-       {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
+  for (const Role role : temperatures) {
     if (!log.has(role)) continue;
     const double low = lowest(log.of(role));
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
@@ -171,7 +170,7 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
   // Without anything that says how warm it is around the motor, a motor that is never cooler than a room can be is no
   // use, whatever its unit.
   const Role motor_at = log.has(Role::housing) ? Role::housing : Role::core;
-  if (!log.has(Role::ambient) && !log.has(Role::coolant) && lowest(log.of(motor_at)) > 55)
+  if (!log.has(sink_of(log)) && lowest(log.of(motor_at)) > 55)
     refuse(
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
                     "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
@@ -459,6 +458,8 @@ Role heat_of(const Log& log) {
   }
   return Role::iq;
 }
+
+Role sink_of(const Log& log) { return log.has(Role::coolant) ? Role::coolant : Role::ambient; }
 
 double first_degC(const Log& log) {
   const Role sensor = count_told(log.of(Role::housing)) > 0 ? Role::housing : Role::core;

@@ -42,6 +42,10 @@ enum class Role {
 };
 inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
 
+/// What is read in degC, the motor's own first.
+inline constexpr Role temperatures[] = {Role::core,  Role::housing,   Role::ambient, Role::coolant,
+                                        Role::frame, Role::neighbour, Role::board};
+
 /// Every role and every unit that a column may be given, one line each, for --help.
 std::string roles_and_units();
 
@@ -87,6 +91,9 @@ bool resumes(const Log& log, double after_s, double until_s);
 
 /// What tells the heat: a power, else a current; iq of currents along two axes.
 Role heat_of(const Log& log);
+
+/// What takes the heat away: the coolant, else the ambient.
+Role sink_of(const Log& log);
 
 /// What the housing, or else the winding, shows before anything flows or turns, on average; its first reading where
 /// something does at once; NaN: none.

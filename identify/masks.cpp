@@ -211,7 +211,7 @@ std::vector<std::size_t> temperature_glitches(const Log& log, Role role) {
   constexpr double fast_s = 2.5, housing_s = 60;
   constexpr double back_share = 0.1;  // so near to where it came from
   const auto &v = log.of(role), &t = log.of(Role::time);
-  const auto& sink = log.of(log.has(Role::coolant) ? Role::coolant : Role::ambient);
+  const auto& sink = log.of(sink_of(log));
   std::vector<std::size_t> read;
   std::vector<double> early;
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -355,8 +355,7 @@ void forget_glitches(Log& log) {
 }
 
 void mask(Log& log) {
-  for (const Role role :
-       {Role::core, Role::housing, Role::ambient, Role::coolant, Role::frame, Role::neighbour, Role::board}) {
+  for (const Role role : temperatures) {
     if (log.has(role)) mask_frozen(log, role);
   }
   note_missing_input(log);
