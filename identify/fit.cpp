@@ -491,6 +491,17 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   return usual.cost < best.cost ? usual : best;
 }
 
+Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordinates) {
+  const Eigen::VectorXd x = motor.x;
+  const Eigen::Index shared = base_count + motor.cause_coordinates(), initial = x.size() - shared;
+  motor.chosen.push_back({cause_named(id), -1});
+  motor.x.resize(x.size() + static_cast<Eigen::Index>(coordinates.size()));
+  motor.x.head(shared) = x.head(shared);
+  std::copy(coordinates.begin(), coordinates.end(), motor.x.begin() + shared);
+  motor.x.tail(initial) = x.tail(initial);
+  return motor;
+}
+
 double cost_of_noise(const Problem& problem) {
   double sum = 0.5 * Averaged(problem).log_determinant;
   for (const Bins& log : problem.logs) {

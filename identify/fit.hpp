@@ -46,6 +46,9 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
+/// The same motor with a further cause of these coordinates: nothing is fitted.
+Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordinates);
+
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.
 double cost_of_noise(const Problem& problem);

@@ -54,22 +54,10 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
   });
   const Fit& prompt = sensor ? two_resistors : motor;
-  const auto later_by = [&](const char* cause, double by_s) {
-    Fit out = prompt;
-    const Eigen::Index shared = base_count + prompt.cause_coordinates();
-    out.chosen.push_back({cause_named(cause), -1});
-    out.x.resize(prompt.x.size() + 1);
-    out.x << prompt.x.head(shared), by_s, prompt.x.tail(prompt.x.size() - shared);
-    return out;
-  };
-  const Fit late = later_by("sensor_lag", lag_s), delayed = later_by("clock_delay", delay_s);
-  Fit framed = two_resistors;
-  framed.chosen = {{cause_named("third_mass"), -1}};
-  framed.x.resize(two_resistors.x.size() + 2);
-  framed.x << two_resistors.x.head(base_count),
-      std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
-      std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W),
-      two_resistors.x.tail(two_resistors.x.size() - base_count);
+  const Fit late = with_cause(prompt, "sensor_lag", {lag_s}), delayed = with_cause(prompt, "clock_delay", {delay_s});
+  Fit framed = with_cause(two_resistors, "third_mass",
+                          {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
+                           std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
   framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
   Problem uneven = problem;
   uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);

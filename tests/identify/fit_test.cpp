@@ -301,14 +301,6 @@ TEST(Fit, WithHiddenHeatTheResidualIsNotWhiteAndTheStretchIsFound) {
   EXPECT_TRUE(hit);
 }
 
-Fit with_lag(const Fit& base, double lag_s, const char* cause = "sensor_lag") {
-  Fit late = base;
-  late.chosen = {{identify::cause_named(cause), -1}};
-  late.x.resize(base.x.size() + 1);
-  late.x << base.x.head(identify::base_count), lag_s, base.x.tail(base.x.size() - identify::base_count);
-  return late;
-}
-
 TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorThatLastsIs) {
   const auto as_assumed = [](std::uint64_t seed) {
     tests::BenchOptions o = off_sheet(seed);
@@ -340,7 +332,8 @@ TEST(Fit, NoiseIsNotListedAsAStretchThatIsWrongAndAnErrorThatLastsIs) {
 TEST(Fit, ALagOfNothingChangesNothing) {
   const Problem problem = problem_from(off_sheet(9));
   const Fit base = identify::fit(problem, {});
-  const auto a = identify::replayed(problem, base, 0), b = identify::replayed(problem, with_lag(base, 0), 0);
+  const auto a = identify::replayed(problem, base, 0),
+             b = identify::replayed(problem, with_cause(base, "sensor_lag", {0}), 0);
   for (std::size_t k = 0; k < a.housing_degC.size(); ++k)
     ASSERT_NEAR(a.housing_degC[k], b.housing_degC[k], 0.02) << "bin " << k;  // K: 20 ms at 1 K/s
 }
@@ -350,8 +343,8 @@ TEST(Fit, ADelayOfNothingChangesNothingAndOneOfAWholeBinMovesByOneBin) {
   const Fit base = identify::fit(problem, {});
   const double bin_s = problem.logs[0].width_s;
   const auto plain = identify::replayed(problem, base, 0),
-             still = identify::replayed(problem, with_lag(base, 0, "clock_delay"), 0),
-             later = identify::replayed(problem, with_lag(base, bin_s, "clock_delay"), 0);
+             still = identify::replayed(problem, with_cause(base, "clock_delay", {0}), 0),
+             later = identify::replayed(problem, with_cause(base, "clock_delay", {bin_s}), 0);
   for (std::size_t k = 1; k < plain.housing_degC.size(); ++k) {
     ASSERT_NEAR(still.housing_degC[k], plain.housing_degC[k], 1e-6) << "bin " << k;
     ASSERT_NEAR(still.core_degC[k], plain.core_degC[k], 1e-6) << "bin " << k;
@@ -364,7 +357,7 @@ TEST(Fit, LeewayAveragesOverALagOfSecondsAndNotOverOneOfHalfAMinute) {
   const Fit base = identify::fit(problem, {});
   const auto gain = [&](double lag_s) {
     Problem late = problem;
-    const auto reading = identify::replayed(problem, with_lag(base, lag_s), 0).housing_degC;
+    const auto reading = identify::replayed(problem, with_cause(base, "sensor_lag", {lag_s}), 0).housing_degC;
     for (std::size_t k = 0; k < reading.size(); ++k) late.logs[0].bins[k].housing_degC += reading[k];
     const auto plain = identify::replayed(problem, base, 0).housing_degC;
     for (std::size_t k = 0; k < plain.size(); ++k) late.logs[0].bins[k].housing_degC -= plain[k];
@@ -533,15 +526,8 @@ TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
   const Problem problem = problem_from(off_sheet(9));
   Fit two = identify::fit(problem, {});
   two.x[2] = std::log(15.0);  // J/K: a winding that follows a step within 16 s, by 5 K/s
-  Fit hot = two;
-  hot.chosen = {{identify::cause_named("hot_spot"), -1}};
-  hot.x.resize(two.x.size() + 2);
-  hot.x << two.x.head(identify::base_count), std::log(8.0), std::log(1.5),
-      two.x.tail(two.x.size() - identify::base_count);
-  Fit felt = two;  // by the housing's sensor
-  felt.chosen = {{identify::cause_named("sensor_placement"), -1}};
-  felt.x.resize(two.x.size() + 1);
-  felt.x << two.x.head(identify::base_count), 0.9, two.x.tail(two.x.size() - identify::base_count);
+  const Fit hot = with_cause(two, "hot_spot", {std::log(8.0), std::log(1.5)}),
+            felt = with_cause(two, "sensor_placement", {0.9});  // by the housing's sensor
   const auto readings = [&](const Fit& f, const identify::Bins& log) {
     const bool of_housing = f.chosen == felt.chosen;
     Problem other = problem;

@@ -121,13 +121,9 @@ TEST(Search, TheHeatOfACauseIsAllowedToComeLateToo) {
       lag{identify::cause_named("sensor_lag"), -1};
   Problem problem = hidden({"stall_imbalance"}, 1).problem;
   identify::Fit motor = identify::fit(problem, {stall});
-  const Eigen::Index shared = identify::base_count + motor.cause_coordinates();
   const auto as_it_was = identify::replayed(problem, motor, 0);
   motor.x[identify::base_count] = 2;
-  identify::Fit late = motor;
-  late.chosen.push_back(lag);
-  late.x.resize(motor.x.size() + 1);
-  late.x << motor.x.head(shared), 0.6, motor.x.tail(motor.x.size() - shared);
+  const identify::Fit late = with_cause(motor, "sensor_lag", {0.6});
   const auto told = identify::replayed(problem, late, 0);
   for (std::size_t k = 0; k < told.housing_degC.size(); ++k) {
     problem.logs[0].bins[k].housing_degC += told.housing_degC[k] - as_it_was.housing_degC[k];
@@ -160,10 +156,7 @@ TEST(Search, WhenInItsRowAWindingWasReadIsNoDelay) {
   Problem problem = hidden({}, 1, tests::Core::dense).problem;
   ASSERT_NEAR(problem.logs[0].interval_s, 0.1, 1e-9);
   identify::Fit motor = identify::fit(problem, {});
-  identify::Fit late = motor;
-  late.chosen = {delay};
-  late.x.resize(motor.x.size() + 1);
-  late.x << motor.x.head(identify::base_count), 0.02, motor.x.tail(motor.x.size() - identify::base_count);
+  const identify::Fit late = with_cause(motor, "clock_delay", {0.02});
   const auto at_once = identify::replayed(problem, motor, 0), after = identify::replayed(problem, late, 0);
   for (std::size_t k = 0; k < after.core_degC.size(); ++k)
     problem.logs[0].bins[k].core_degC += after.core_degC[k] - at_once.core_degC[k];
