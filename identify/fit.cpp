@@ -241,6 +241,18 @@ void decouple(Eigen::MatrixXd& A, Eigen::Index i, double diagonal) {
   A(i, i) = diagonal;
 }
 
+/// Fit::narrowing. Where a bound holds a coordinate, nothing was learned but the bound.
+double narrowing(Eigen::MatrixXd H, const std::vector<Coordinate>& c, const std::vector<bool>& held) {
+  for (Eigen::Index i = 0; i < H.rows(); ++i) {
+    const double sd = c[static_cast<std::size_t>(i)].sd;
+    H.row(i) *= sd;
+    H.col(i) *= sd;
+    if (held[static_cast<std::size_t>(i)]) decouple(H, i, 1);
+  }
+  return H.ldlt().vectorD().array().abs().log().sum();
+}
+
+/// Levenberg-Marquardt from x, `most` steps; the damping goes by what a step keeps of its promise.
 Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
             const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
   const Eigen::Index n = x.size();
@@ -311,19 +323,11 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
     if (!better) break;
     linearise();
   }
-  // Where a bound holds a coordinate, nothing was learned but the bound.
-  Eigen::MatrixXd narrowed = H;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double sd = c[static_cast<std::size_t>(i)].sd;
-    narrowed.row(i) *= sd;
-    narrowed.col(i) *= sd;
-    if (held[static_cast<std::size_t>(i)]) decouple(narrowed, i, 1);
-  }
+  out.narrowing = narrowing(H, c, held);
   for (Eigen::Index i = 0; i < now.leeway.size(); ++i)
     out.uneven_per_A2 += now.leeway[i] * problem.leeway[static_cast<std::size_t>(i)].uneven_per_A2;
   // From phases that share their heat at once to phases that share none (problem.cpp).
   out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
-  out.narrowing = narrowed.ldlt().vectorD().array().abs().log().sum();
   out.x = x;
   out.information = H;
   out.from_data = now.information;
@@ -397,6 +401,82 @@ std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f
   return out;
 }
 
+/// Into x: base and initial coordinates of the first of `warm`, each cause's of the first of them that has it. Says
+/// whether one has the last cause, or there is none.
+bool take(std::initializer_list<const Fit*> warm, const Problem& problem, const std::vector<Chosen>& chosen,
+          Eigen::VectorXd& x) {
+  if (warm.size() > 0) {
+    const Fit& from = **warm.begin();
+    Eigen::Index initial = 0;
+    for (const Bins& log : problem.logs) initial += own_count(log);
+    x.head(base_count) = from.x.head(base_count);
+    x.tail(initial) = from.x.tail(initial);
+  }
+  bool last_is_known = true;
+  Eigen::Index at = base_count;
+  for (const Chosen& cause : chosen) {
+    const Eigen::Index parameters = coordinates_of({cause});
+    last_is_known = false;
+    for (const Fit* from : warm) {
+      Eigen::Index there = base_count;
+      for (const Chosen& other : from->chosen) {
+        if (!last_is_known && other == cause) {
+          x.segment(at, parameters) = from->x.segment(there, parameters);
+          last_is_known = true;
+        }
+        there += coordinates_of({other});
+      }
+    }
+    at += parameters;
+  }
+  return last_is_known;
+}
+
+/// Two resistors that started at x and ended as `best`: the lowest of that and of two valleys known to lie beside it.
+template <class Descent>
+Fit out_of_poor_valleys(Fit best, Eigen::VectorXd x, int most, const Descent& descend_from) {
+  const auto start_at = [&](const Eigen::VectorXd& other) {
+    Fit f = descend_from(other, most);
+    if (f.cost < best.cost) best = std::move(f);
+  };
+  // Where the winding is fast and read now and then, too small a capacity has a valley of its own.
+  x[2] += std::log(4.0);
+  start_at(x);
+  // With the two masses exchanged the housing looks nearly the same.
+  x = best.x;
+  std::swap(x[2], x[3]);
+  start_at(x);
+  return best;
+}
+
+/// With the last cause started in each of its valleys, all else from x: a few steps tell which is worth descending
+/// into.
+template <class Descent>
+Fit lowest_valley(const Problem& problem, const std::vector<Chosen>& chosen, const std::vector<Coordinate>& c,
+                  Eigen::VectorXd x, int most, const Descent& descend_from) {
+  constexpr int look = 4;
+  const Cause& cause = cause_of(chosen.back());
+  const Eigen::Index parameters = coordinates_of({chosen.back()}),
+                     at = base_count + coordinates_of(chosen) - parameters;
+  auto starts = starts_of(cause, c, static_cast<std::size_t>(at));
+  if (cause.edit == Edit::delay) {
+    Fit prompt;
+    prompt.chosen.assign(chosen.begin(), chosen.end() - 1);
+    prompt.x.resize(x.size() - 1);
+    prompt.x << x.head(at), x.tail(x.size() - at - 1);
+    const Coordinate& delay = c[static_cast<std::size_t>(at)];
+    starts.push_back({likeliest_delay_s(problem, prompt, delay.low, delay.high)});
+  }
+  Fit best;
+  for (const auto& start : starts) {
+    for (std::size_t p = 0; p < start.size(); ++p) x[at + static_cast<Eigen::Index>(p)] = start[p];
+    Fit f = descend_from(x, starts.size() > 1 ? std::min(look, most) : most);
+    if (f.valid() && (!best.valid() || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
+  }
+  if (best.settled || !best.valid() || starts.size() == 1) return best;
+  return descend_from(best.x, most);
+}
+
 }  // namespace
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
@@ -416,78 +496,21 @@ Eigen::MatrixXd Fit::covariance(bool bounds_hold) const {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm, int most) {
   const auto c = layout(problem, chosen);
   const Averaged averaged(problem);
-  const auto n = static_cast<Eigen::Index>(c.size());
-  Eigen::VectorXd x(n);
-  for (Eigen::Index i = 0; i < n; ++i) x[i] = c[static_cast<std::size_t>(i)].start;
-  if (warm.size() > 0) {
-    const Fit& from = **warm.begin();
-    Eigen::Index initial = 0;
-    for (const Bins& log : problem.logs) initial += own_count(log);
-    x.head(base_count) = from.x.head(base_count);
-    x.tail(initial) = from.x.tail(initial);
-  }
-  bool last_is_known = true;
-  Eigen::Index at = base_count, last = base_count;
-  for (const Chosen& cause : chosen) {
-    last = at;
-    const Eigen::Index parameters = coordinates_of({cause});
-    last_is_known = false;
-    for (const Fit* from : warm) {
-      Eigen::Index there = base_count;
-      for (const Chosen& other : from->chosen) {
-        if (!last_is_known && other == cause) {
-          x.segment(at, parameters) = from->x.segment(there, parameters);
-          last_is_known = true;
-        }
-        there += coordinates_of({other});
-      }
-    }
-    at += parameters;
-  }
-  if (last_is_known) {
-    Fit best = descend(problem, averaged, chosen, c, x, most);
-    if (warm.size() > 0 || !best.valid()) return best;
-    const auto start_at = [&](const Eigen::VectorXd& other) {
-      Fit f = descend(problem, averaged, chosen, c, other, most);
-      if (f.cost < best.cost) best = std::move(f);
-    };
-    // Where the winding is fast and read now and then, too small a capacity has a valley of its own.
-    x[2] += std::log(4.0);
-    start_at(x);
-    // With the two masses exchanged the housing looks nearly the same.
-    x = best.x;
-    std::swap(x[2], x[3]);
-    start_at(x);
-    return best;
-  }
-
-  // A few steps tell which valley is worth descending into.
-  constexpr int look = 4;
-  const auto usual_starts = starts_of(cause_of(chosen.back()), c, static_cast<std::size_t>(last));
-  const auto fitted_from = [&](Eigen::VectorXd from) {
-    Fit best;
-    auto starts = usual_starts;
-    if (cause_of(chosen.back()).edit == Edit::delay) {
-      Fit prompt;
-      prompt.chosen.assign(chosen.begin(), chosen.end() - 1);
-      prompt.x.resize(n - 1);
-      prompt.x << from.head(last), from.tail(n - last - 1);
-      const Coordinate& delay = c[static_cast<std::size_t>(last)];
-      starts.push_back({likeliest_delay_s(problem, prompt, delay.low, delay.high)});
-    }
-    for (const auto& start : starts) {
-      for (std::size_t p = 0; p < start.size(); ++p) from[last + static_cast<Eigen::Index>(p)] = start[p];
-      Fit f = descend(problem, averaged, chosen, c, from, starts.size() > 1 ? std::min(look, most) : most);
-      if (f.valid() && (!best.valid() || f.cost - f.promise < best.cost - best.promise)) best = std::move(f);
-    }
-    if (best.settled || !best.valid() || starts.size() == 1) return best;
-    return descend(problem, averaged, chosen, c, best.x, most);
+  Eigen::VectorXd x(static_cast<Eigen::Index>(c.size()));
+  for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = c[static_cast<std::size_t>(i)].start;
+  const bool last_is_known = take(warm, problem, chosen, x);
+  const auto descend_from = [&](const Eigen::VectorXd& from, int steps) {
+    return descend(problem, averaged, chosen, c, from, steps);
   };
-  Fit best = fitted_from(x);
+  if (last_is_known) {
+    Fit best = descend_from(x, most);
+    return warm.size() > 0 || !best.valid() ? best : out_of_poor_valleys(std::move(best), x, most, descend_from);
+  }
+  Fit best = lowest_valley(problem, chosen, c, x, most, descend_from);
   if (warm.size() > 0 || problem.belief.known) return best;
   // What two resistors alone are fitted best by may have no winding to speak of.
   x.head(base_count) << x[1] + std::log(R1_of_R2.middle), x[1], x[3] + std::log(C1_of_C2.middle), x[3];
-  Fit usual = fitted_from(x);
+  Fit usual = lowest_valley(problem, chosen, c, x, most, descend_from);
   return usual.cost < best.cost ? usual : best;
 }
 
