@@ -274,6 +274,44 @@ void mark_ties(const Problem& problem, const Left& left, double reach, const Mar
   }
 }
 
+/// The verdict on the set that was chosen, and why.
+void decide(const Problem& problem, const Left& left, const Disturbance& without_causes, double reach,
+            const Margins& margins, Search& out) {
+  std::string sets;
+  for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)
+    sets += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
+  out.steps.push_back("The best sets and their evidence: " + sets + ".");
+
+  const bool tie = out.tied.size() > 1;
+  if (!left.believed && !noticeable(problem, without_causes, margins)) {
+    out.verdict = Verdict::adequate;
+    out.tied.clear();
+    out.sets.clear();
+    out.steps.push_back(fmt::format(
+        "The best is {}, but over a slow disturbance of {:.2f} K alone it gains {:.1f}, and {:.1f} where readings "
+        "are believed no closer than a model can be right: no more than sensors wander and a model of a few nodes is "
+        "off.",
+        listed(out.chosen.fit.chosen), without_causes.noise.disturbance_K, left.explains, left.still));
+    out.chosen = out.base;
+  } else if (!left.believed || (!left.complete && !left.mostly && !(left.nearly && tie))) {
+    out.verdict = Verdict::unknown_cause;
+    out.steps.push_back(fmt::format("The best is {}, but {}: none of the known causes explains this.",
+                                    listed(out.chosen.fit.chosen), left.words()));
+  } else {
+    out.verdict = tie ? Verdict::ambiguous : left.complete ? Verdict::explained : Verdict::partly_explained;
+    out.remains_K = left.complete ? 0 : left.after_K;
+    out.steps.push_back(
+        tie ? fmt::format("{} other set{} within {:.0f} of it cannot be told from it with this data; {}.",
+                          out.tied.size() - 1, out.tied.size() > 2 ? "s" : "", reach, left.words())
+            : fmt::format("No other set comes {}; {}.",
+                          left.complete ? fmt::format("within {:.0f} of it", reach)
+                                        : std::string("near it, what is left over counted for each"),
+                          left.words()));
+    if (!left.complete && !left.mostly)
+      out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
+  }
+}
+
 /// Too little for a name, and yet likelier than two resistors: a board must not take it for excluded.
 void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
   std::vector<double> likelier(out.singles.size(), 0.0);
@@ -369,40 +407,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const double reach = left.complete ? margins.tie : margins.tie + left.gain;
   mark_ties(problem, left, reach, margins, out);
-
-  std::string ladder;
-  for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)
-    ladder += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
-  out.steps.push_back("The best sets and their evidence: " + ladder + ".");
-
-  const bool tie = out.tied.size() > 1;
-  if (!left.believed && !noticeable(problem, without_causes, margins)) {
-    out.verdict = Verdict::adequate;
-    out.tied.clear();
-    out.sets.clear();
-    out.steps.push_back(fmt::format(
-        "The best is {}, but over a slow disturbance of {:.2f} K alone it gains {:.1f}, and {:.1f} where readings "
-        "are believed no closer than a model can be right: no more than sensors wander and a model of a few nodes is "
-        "off.",
-        listed(out.chosen.fit.chosen), without_causes.noise.disturbance_K, left.explains, left.still));
-    out.chosen = out.base;
-  } else if (!left.believed || (!left.complete && !left.mostly && !(left.nearly && tie))) {
-    out.verdict = Verdict::unknown_cause;
-    out.steps.push_back(fmt::format("The best is {}, but {}: none of the known causes explains this.",
-                                    listed(out.chosen.fit.chosen), left.words()));
-  } else {
-    out.verdict = tie ? Verdict::ambiguous : left.complete ? Verdict::explained : Verdict::partly_explained;
-    out.remains_K = left.complete ? 0 : left.after_K;
-    out.steps.push_back(
-        tie ? fmt::format("{} other set{} within {:.0f} of it cannot be told from it with this data; {}.",
-                          out.tied.size() - 1, out.tied.size() > 2 ? "s" : "", reach, left.words())
-            : fmt::format("No other set comes {}; {}.",
-                          left.complete ? fmt::format("within {:.0f} of it", reach)
-                                        : std::string("near it, what is left over counted for each"),
-                          left.words()));
-    if (!left.complete && !left.mostly)
-      out.steps.push_back("No rest shows how the sensors wander of themselves: what is left may be theirs.");
-  }
+  decide(problem, left, without_causes, reach, margins, out);
   refit_for_the_board(judged, margins, out);
   const std::string beyond = at_a_bound(out.chosen.fit);
   if (!beyond.empty() && names_causes(out.verdict)) {
