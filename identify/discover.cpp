@@ -233,6 +233,41 @@ Offer for_the_board(const Problem& problem, const Search& found, Report& report)
   return given;
 }
 
+/// The search, and what speaks against answering by it.
+struct Judged {
+  Search found;
+  std::string poor;  // why there is no verdict; empty: there is one
+  bool vetoed = false;
+};
+
+/// `held_out`: part of the data is, and a cause that spoils the last quarter of the rest is refused.
+Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& logs,
+              const std::optional<wire::pc::MotorFile>& motor, bool held_out) {
+  Judged out;
+  auto& [found, poor, vetoed] = out;
+  poor = too_poor(problem);
+  if (!poor.empty()) return out;
+  found = search(problem);
+  poor = too_short(problem, base, found);
+  if (poor.empty()) poor = suspicion(problem, found, logs, motor);
+  if (poor.empty()) poor = too_sparse(problem, found, logs);
+  if (!poor.empty() || !held_out || found.chosen.fit.chosen.empty()) return out;
+  const std::string refused = veto(problem, found.base.fit, found.chosen.fit);
+  vetoed = !refused.empty();
+  if (vetoed && found.verdict != Verdict::unknown_cause) {
+    found.verdict = Verdict::unknown_cause;
+    found.tied.clear();
+    found.steps.push_back(refused);
+  }
+  return out;
+}
+
+/// Why no board gets a set; empty when one does.
+std::string why_no_model(const Problem& problem, const std::string& poor) {
+  if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
+  return problem.heated_by_power() ? "the log tells a power and a board measures a current; record current_A" : "";
+}
+
 std::vector<std::string> noise_words(const Problem& problem) {
   const Noise& n = problem.noise;
   std::vector<std::string> out;
@@ -292,23 +327,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
-  std::string poor = too_poor(problem);
-  Search found;
-  bool vetoed = false;
-  if (poor.empty()) {
-    found = search(problem);
-    poor = too_short(problem, base, found);
-    if (poor.empty()) poor = suspicion(problem, found, logs, motor);
-    if (poor.empty()) poor = too_sparse(problem, found, logs);
-    const bool to_judge = poor.empty() && unseen && !found.chosen.fit.chosen.empty();
-    const std::string refused = to_judge ? veto(problem, found.base.fit, found.chosen.fit) : "";
-    vetoed = !refused.empty();
-    if (vetoed && found.verdict != Verdict::unknown_cause) {
-      found.verdict = Verdict::unknown_cause;
-      found.tied.clear();
-      found.steps.push_back(refused);
-    }
-  }
+  auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value());
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
   // more: of 33 such sets 8 did worse on another log (those of score's outside and removed rows, seeds 893 and 894).
@@ -349,10 +368,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     if (nearest) report.held_out->nearest = ids_of(nearest->chosen);
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }
-  if (!poor.empty())
-    report.no_model = "this log cannot tell; run the board with the motor's sheet";
-  else if (problem.heated_by_power())
-    report.no_model = "the log tells a power and a board measures a current; record current_A";
+  report.no_model = why_no_model(problem, poor);
   if (!report.no_model.empty()) return report;
   report.model_toml = heat_set_toml(problem, *offer.fit, report.sentence, offer.trust);
   report.baseline_toml =
