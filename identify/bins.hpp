@@ -67,8 +67,8 @@ struct Bins {
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 
-/// `finest_s`: bins no longer than this where the sampling allows it (about half the winding's time constant). Throws
-/// UserError (unusable) when the rows are too few, or share their times.
+/// `finest_s`: bins no longer than this where the sampling allows it (a quarter to a half of the winding's time
+/// constant). Throws UserError (unusable) when the rows are too few, or share their times.
 Bins bins_of(const Log& log, double finest_s);
 
 /// Adds what flows at one moment, each nonlinear form for itself, with its share of the bin. `sampled_A`: amplitude

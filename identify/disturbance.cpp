@@ -22,6 +22,7 @@ constexpr struct Unmodelled { double share, over_s; } of_a_housing{0.001, 240};
 /// within seconds. Believed as a housing, such sensors of host-sim came out on the very winding (602, 10003, 10045;
 /// true is 0.9 of the way), and as a winding within two of their standard errors.
 constexpr Unmodelled of_a_winding{0.01, 5};
+
 double housing_range_K(const Problem& problem) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Bins& log : problem.logs) {

@@ -14,6 +14,7 @@
 namespace identify {
 namespace {
 
+/// Ten hours in bins of a second, which a search is to do within 10 s on two cores (README): of more, coarser ones.
 constexpr double most_fine_bins = 36000;
 
 using thermal::Drive;

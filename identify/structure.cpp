@@ -238,7 +238,8 @@ Structure structure(const Problem& problem, const Fit& f) {
   std::sort(out.wrong.begin(), out.wrong.end(), [](const Wrong& a, const Wrong& b) {
     return std::abs(a.mean_K) * (a.to_s - a.from_s) > std::abs(b.mean_K) * (b.to_s - b.from_s);
   });
-  if (out.wrong.size() > 8) out.wrong.resize(8);
+  constexpr std::size_t most_told = 8;  // a person reads no more
+  if (out.wrong.size() > most_told) out.wrong.resize(most_told);
   return out;
 }
 
