@@ -12,7 +12,6 @@
 #include <stdexcept>
 
 #include "host-sim/plant/excitation.hpp"
-#include "wire/pc/motor_file.hpp"
 
 namespace tests {
 namespace {
@@ -270,17 +269,16 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   Draw d{std::mt19937_64(o.seed * 7919 + 17 + draw * 6700417)};
   HiddenLog out;
   const MotorRow& row = motors[static_cast<std::size_t>(d.uniform(0, 0.9999) * static_cast<double>(std::size(motors)))];
-  out.motor = row.name;
-  out.sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors").motor;
-  out.sheet.R1_K_per_W = row.R1;
-  out.sheet.R2_K_per_W = row.R2;
-  out.sheet.C1_J_per_K = row.tau_w / row.R1;
-  out.sheet.C2_J_per_K = row.tau_m / row.R2;
-  out.sheet.rated_current_A = 1e3;  // resistance, and with it current, is a gauge here: no sheet value to compare with
-  out.truth = out.sheet;
-  for (double* v : {&out.truth.R1_K_per_W, &out.truth.R2_K_per_W, &out.truth.C1_J_per_K, &out.truth.C2_J_per_K})
-    *v *= d.log_uniform(0.6, 1.8);
-  const wire::Motor& m = out.truth;
+  out.sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  out.sheet.name = row.name;
+  wire::Motor& sheet = out.sheet.motor;
+  sheet.R1_K_per_W = row.R1;
+  sheet.R2_K_per_W = row.R2;
+  sheet.C1_J_per_K = row.tau_w / row.R1;
+  sheet.C2_J_per_K = row.tau_m / row.R2;
+  sheet.rated_current_A = 1e3;  // resistance, and with it current, is a gauge here: no sheet value to compare with
+  wire::Motor& m = out.truth = sheet;
+  for (double* v : {&m.R1_K_per_W, &m.R2_K_per_W, &m.C1_J_per_K, &m.C2_J_per_K}) *v *= d.log_uniform(0.6, 1.8);
 
   // Load such that the housing ends about 45 K up; a slow motor is loaded harder, or 20 minutes would not warm it.
   const double tau = m.R2_K_per_W * m.C2_J_per_K, reached = 1 - std::exp(-0.6 * o.seconds / tau);
@@ -292,7 +290,7 @@ std::optional<HiddenLog> drawn(const HiddenLogOptions& o, std::uint64_t draw, co
   const double start = d.uniform(0, 1) < 0.6 ? ambient : ambient + d.uniform(0, 12);
   const auto duty = [&](Draw& of) {
     return o.duty == Duty::robot ? robot_duty(of, rms_A, top, o.seconds)
-                                 : designed_profile(of, out.sheet, rms_A, top, o.seconds);
+                                 : designed_profile(of, sheet, rms_A, top, o.seconds);
   };
   auto rows = duty(d);
   auto neighbour = wandering(d, rows.size(), ambient, 180);

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "host-sim/plant/stove.hpp"
-#include "wire/motor.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace tests {
 
@@ -41,10 +41,8 @@ struct HiddenLogOptions {
 };
 
 struct HiddenLog {
-  std::string csv;    // path
-  wire::Motor sheet;  // what the program is told
+  wire::pc::MotorFile sheet;  // what the program is told
   wire::Motor truth;
-  std::string motor;
   double core_error_K = 0;        // rms of the winding with the effect against without it
   std::vector<double> core_degC;  // truth at each row
   // What each effect truly is, in the parameters of identify's table (none for effects outside of it).

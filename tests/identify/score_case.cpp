@@ -19,15 +19,8 @@ using identify::Fit, identify::Problem, identify::Search, identify::Verdict;
 
 constexpr double row_s = 0.1;
 
-wire::pc::MotorFile sheet_of(const HiddenLog& log) {
-  wire::pc::MotorFile file;
-  file.motor = log.sheet;
-  file.name = log.motor;
-  return file;
-}
-
 std::vector<identify::Log> read(const HiddenLog& log, const std::string& path) {
-  return identify::logs_of(identify::read_table(path), {}, log.sheet);
+  return identify::logs_of(identify::read_table(path), {}, log.sheet.motor);
 }
 
 /// rms of the simulated winding against the truth, log 0 of the problem.
@@ -52,7 +45,7 @@ void measure_gain(const CaseOptions& options, const HiddenLog& log, const Proble
   other.again = 1;
   const HiddenLog second = make_hidden_log(other, path);
   Problem unseen = problem;
-  unseen.logs = identify::problem_of(read(log, path), sheet_of(log)).logs;
+  unseen.logs = identify::problem_of(read(log, path), log.sheet).logs;
   const bool extends = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
   result.core_before_K = core_error_K(unseen, identify::transferred(unseen, found.base.fit), second.core_degC);
   result.core_after_K = extends
@@ -98,7 +91,7 @@ Problem as_it_was(const HiddenLogOptions& options, const Problem& problem, const
   HiddenLogOptions quiet = options;
   quiet.noisy = false;
   make_hidden_log(quiet, path);
-  Problem out = identify::problem_of(read(log, path), sheet_of(log));
+  Problem out = identify::problem_of(read(log, path), log.sheet);
   out.noise = problem.noise;
   out.leeway = identify::ordinary_leeway(out, identify::fit(out, {}));
   return out;
@@ -153,7 +146,7 @@ void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<
   auto both = first;
   for (identify::Log& more : read(log, path)) both.push_back(std::move(more));
   CaseResult again;
-  Problem joint = identify::problem_of(both, sheet_of(log));
+  Problem joint = identify::problem_of(both, log.sheet);
   const Search now = identify::search(joint, options.margins, options.removed);
   again.truth = result.truth;
   again.verdict = now.verdict;
@@ -193,14 +186,14 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   result.truth = options.log.effects;
   std::sort(result.truth.begin(), result.truth.end());
   const std::clock_t start = std::clock();
-  Problem problem = identify::problem_of(logs, options.blind ? std::nullopt : std::optional(sheet_of(log)));
+  Problem problem = identify::problem_of(logs, options.blind ? std::nullopt : std::optional(log.sheet));
   const Search found = identify::search(problem, options.margins, options.removed);
   result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.verdict = found.verdict;
   result.answer = found.tied;
   result.steps = found.steps;
-  result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f};", log.motor, log.core_error_K, found.base.ratio,
-                               found.chosen.ratio);
+  result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f};", log.sheet.name, log.core_error_K,
+                               found.base.ratio, found.chosen.ratio);
   if (!options.blind) check_parameters(log, problem, found, result);
   if (options.separability) {
     const bool outside = identify::cause_named(result.truth.front()) < 0;

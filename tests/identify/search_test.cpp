@@ -37,16 +37,10 @@ struct Hidden {
 };
 
 Hidden hidden(const tests::HiddenLogOptions& o) {
-  const std::string path =
-      (std::filesystem::temp_directory_path() /
-       (std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv"))
-          .string();
+  const std::string path = (std::filesystem::temp_directory_path() / "hidden.csv").string();
   Hidden out{{}, tests::make_hidden_log(o, path), {}};
-  wire::pc::MotorFile sheet;
-  sheet.motor = out.log.sheet;
-  sheet.name = out.log.motor;
-  out.logs = identify::logs_of(identify::read_table(path), {}, out.log.sheet);
-  out.problem = identify::problem_of(out.logs, sheet);
+  out.logs = identify::logs_of(identify::read_table(path), {}, out.log.sheet.motor);
+  out.problem = identify::problem_of(out.logs, out.log.sheet);
   return out;
 }
 
@@ -230,13 +224,11 @@ TEST(Search, AThirdMassAChangeOfCoolingAndALateSensorGoOnThroughAPause) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   for (const char* id : {"third_mass", "cooling_change", "sensor_lag"}) {
     Hidden log = hidden({id}, 4242);
-    wire::pc::MotorFile sheet;
-    sheet.motor = log.log.sheet;
     for (auto& column : log.logs[0].columns) {
       if (!column.empty()) column.erase(column.begin() + 5000, column.begin() + 7000);
     }
     log.logs[0].resumes_s = {700};
-    const auto found = identify::search(identify::problem_of(log.logs, sheet));
+    const auto found = identify::search(identify::problem_of(log.logs, log.log.sheet));
     EXPECT_TRUE(names(found)) << id << ": " << found.steps.back();
     ASSERT_FALSE(found.tied.empty()) << id;
     EXPECT_EQ(found.tied.front(), std::vector<std::string>{id});
@@ -300,8 +292,7 @@ TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto bin_s = [](const tests::HiddenLogOptions& o) {
     const Hidden log = hidden(o);
-    wire::pc::MotorFile slow;  // a sheet that is ten times off, or bins would be short at once
-    slow.motor = log.log.sheet;
+    wire::pc::MotorFile slow = log.log.sheet;  // ten times off, or bins would be short at once
     slow.motor.C1_J_per_K *= 10;
     return identify::problem_of(log.logs, slow).logs[0].width_s;
   };
@@ -349,9 +340,7 @@ identify::Search of_a_noisy_current(const tests::HiddenLogOptions& o, bool fan) 
     if (fan) speed[k] = 300 * current[k] / rms_A;
     current[k] += noise(random);
   }
-  wire::pc::MotorFile sheet;
-  sheet.motor = log.log.sheet;
-  return identify::search(identify::problem_of(log.logs, sheet));
+  return identify::search(identify::problem_of(log.logs, log.log.sheet));
 }
 
 TEST(NoisyCurrent, IsNotTakenForWhatTheMotorDoes) {
@@ -612,9 +601,7 @@ TEST(ModelFile, HoldsTheFoundEditAsAHeatSet) {
 
 identify::Report report_of(const tests::HiddenLogOptions& o) {
   const Hidden log = hidden(o);
-  wire::pc::MotorFile sheet;
-  sheet.motor = log.log.sheet;
-  return identify::discover(log.logs, sheet, {});
+  return identify::discover(log.logs, log.log.sheet);
 }
 
 TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
@@ -637,11 +624,9 @@ TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
 TEST(Report, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 11, .effects = {"windage"}});
-  wire::pc::MotorFile sheet;
-  sheet.motor = log.log.sheet;
-  EXPECT_TRUE(identify::discover(log.logs, sheet).verdict.ends_with("explained"));
+  EXPECT_TRUE(identify::discover(log.logs, log.log.sheet).verdict.ends_with("explained"));
   std::swap(log.logs[0].of(identify::Role::core), log.logs[0].of(identify::Role::housing));
-  const auto report = identify::discover(log.logs, sheet);
+  const auto report = identify::discover(log.logs, log.log.sheet);
   EXPECT_EQ(report.verdict, "insufficient");
   EXPECT_NE(report.sentence.find("core_degC and housing_degC are swapped"), std::string::npos) << report.sentence;
 }
