@@ -8,7 +8,7 @@
 #include "identify/replay.hpp"
 #include "identify/structure.hpp"
 #include "identify/table.hpp"
-#include "tests/identify/bench_log.hpp"
+#include "tests/identify/bench.hpp"
 
 namespace {
 
@@ -16,14 +16,11 @@ using identify::Chosen;
 using identify::Fit;
 using identify::Problem;
 
-const auto sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+const auto sheet = tests::ec_16();
 
 Problem problem_from(const tests::BenchOptions& options, bool with_sheet = true,
                      std::optional<double> copper = std::nullopt) {
-  const std::string name =
-      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
-  const auto logs = identify::logs_of(identify::read_table(tests::write_bench_log(name, options)), {}, std::nullopt);
-  return identify::problem_of(logs, with_sheet ? std::optional(sheet) : std::nullopt, copper);
+  return identify::problem_of(tests::bench_logs({options}), with_sheet ? std::optional(sheet) : std::nullopt, copper);
 }
 
 tests::BenchOptions off_sheet(std::uint64_t seed) {
@@ -34,6 +31,9 @@ tests::BenchOptions off_sheet(std::uint64_t seed) {
   o.motor = {0.75, 0.00393, 1.08 * 1.5, 16.3 * 0.7, 1.13 * 0.8, 18.0 * 1.4};
   return o;
 }
+
+/// The same in coordinates of a fit.
+const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
 
 TEST(Dual, DerivativesAreExact) {
   using D = identify::Dual<2>;
@@ -129,15 +129,13 @@ TEST(Fit, SoTheyDoAfterAPause) { expect_exact_sensitivities(paused(with_all_driv
 TEST(Fit, APauseInWhichTheMotorRanOnCostsNoParameter) {
   tests::BenchOptions options;
   options.core_every_s = 20;
-  auto logs =
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_pause.csv", options)), {}, std::nullopt);
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  const identify::Fit whole = identify::fit(identify::problem_of(logs, motor), {});
+  auto logs = tests::bench_logs({options});
+  const identify::Fit whole = identify::fit(identify::problem_of(logs, sheet), {});
   for (auto& column : logs[0].columns) {
     if (!column.empty()) column.erase(column.begin() + 4000, column.begin() + 4300);
   }
   const auto error = [&](const std::vector<identify::Log>& read) {
-    const identify::Fit f = identify::fit(identify::problem_of(read, motor), {});
+    const identify::Fit f = identify::fit(identify::problem_of(read, sheet), {});
     return ((f.x.head(4) - whole.x.head(4)).array() / whole.std_errors().head(4).array()).abs().maxCoeff();
   };
   const double bridged = error(logs);
@@ -150,8 +148,7 @@ TEST(Problem, AFilterTakesNoNoiseAwayThatLastsLongerThanItself) {
   tests::BenchOptions options = off_sheet(3);
   options.step_K = 0;
   options.seconds = 1500;
-  auto logs =
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_filter.csv", options)), {}, std::nullopt);
+  auto logs = tests::bench_logs({options});
   const double plain_K = identify::problem_of(logs, sheet).noise.housing_white_K;
   EXPECT_NEAR(plain_K, options.white_K, 0.02);
   const auto filtered_K = [&](double tau_s) {
@@ -237,7 +234,6 @@ TEST(Replay, WhereSeveralPausesEndInOneMergedBinTheLastCounts) {
 }
 
 TEST(Fit, RecoversParametersWithinItsStatedErrors) {
-  const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
   int inside = 0, all = 0;
   double square = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -270,7 +266,6 @@ TEST(Fit, StatedErrorsThatAreTooSmallWouldBeSeen) {
     problem.noise.core_white_K /= 10;
     const Fit f = identify::fit(problem, {});
     const Eigen::VectorXd sd = f.std_errors();
-    const Eigen::Vector4d truth(std::log(1.08 * 1.5), std::log(16.3 * 0.7), std::log(1.13 * 0.8), std::log(18.0 * 1.4));
     for (int i = 0; i < 4; ++i) inside += std::abs(f.x[i] - truth[i]) < 2 * sd[i];
   }
   EXPECT_LT(inside, 17);
@@ -389,10 +384,7 @@ TEST(Fit, AnUnknownMotorIsFoundFromTheDataAlone) {
 TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
   tests::BenchOptions cold = off_sheet(7), warm = off_sheet(8);
   warm.start_degC = 60;
-  auto logs =
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_cold.csv", cold)), {}, std::nullopt);
-  logs.push_back(
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_warm.csv", warm)), {}, std::nullopt)[0]);
+  const auto logs = tests::bench_logs({cold, warm});
   const Problem problem = identify::problem_of(logs, sheet);
   const Fit f = identify::fit(problem, {});
   ASSERT_EQ(f.x.size(), 8);
@@ -562,9 +554,7 @@ TEST(Replay, AStepOfLoadInsideABinIsSeenWhereItIs) {
 }
 
 TEST(Replay, IrregularSamplesGiveTheSameParameters) {
-  tests::BenchOptions options = off_sheet(6);
-  const std::string path = tests::write_bench_log("hotcore_regular.csv", options);
-  const auto whole = identify::logs_of(identify::read_table(path), {}, std::nullopt);
+  const auto whole = tests::bench_logs({off_sheet(6)});
   identify::Log thinned = whole[0];
   std::mt19937_64 random(11);
   std::vector<std::size_t> kept;

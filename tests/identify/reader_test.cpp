@@ -22,10 +22,7 @@ using identify::Role;
 using wire::pc::UserError;
 
 std::string file(const std::string& text) {
-  const std::string path =
-      (std::filesystem::temp_directory_path() /
-       (std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv"))
-          .string();
+  const std::string path = (std::filesystem::temp_directory_path() / "log.csv").string();
   std::ofstream(path, std::ios::binary) << text;
   return path;
 }

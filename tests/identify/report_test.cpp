@@ -16,7 +16,7 @@
 #include "identify/held_out.hpp"
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"
-#include "tests/identify/bench_log.hpp"
+#include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "tests/identify/traction.hpp"
@@ -26,10 +26,7 @@ namespace {
 using nlohmann::json;
 
 identify::Report report_of(const tests::BenchOptions& options, const identify::HoldOut& held = {}) {
-  const std::string name =
-      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
-  const auto logs = identify::logs_of(identify::read_table(tests::write_bench_log(name, options)), {}, std::nullopt);
-  return identify::discover(logs, wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"), held);
+  return identify::discover(tests::bench_logs({options}), tests::ec_16(), held);
 }
 
 struct Outcome {
@@ -81,10 +78,7 @@ TEST(Report, ACauseThatDoesNotGoOnIsRefusedByTheDataNotFitted) {
   options.core_every_s = 20;
   options.seconds = 1200;
   const auto veto = [&](const char* id) {
-    const auto path = tests::write_bench_log("hotcore_veto.csv", options);
-    const auto logs = identify::logs_of(identify::read_table(path), {}, std::nullopt);
-    const auto problem =
-        identify::problem_of(logs, wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+    const auto problem = identify::problem_of(tests::bench_logs({options}), tests::ec_16());
     return identify::veto(problem, identify::fit(problem, {}),
                           identify::fit(problem, {{identify::cause_named(id), -1}}));
   };
@@ -95,28 +89,17 @@ TEST(Report, ACauseThatDoesNotGoOnIsRefusedByTheDataNotFitted) {
   EXPECT_EQ(veto("ambient_drift"), "");
 }
 
-std::vector<identify::Log> bench_logs(std::initializer_list<tests::BenchOptions> each) {
-  std::vector<identify::Log> out;
-  for (const tests::BenchOptions& options : each) {
-    for (auto& log :
-         identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_logs.csv", options)), {}, std::nullopt))
-      out.push_back(std::move(log));
-  }
-  return out;
-}
-
 TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   tests::BenchOptions fan, still, unseen;
   for (auto* o : {&fan, &still, &unseen}) o->core_every_s = 20;
   fan.motor.R2 /= 4;
   still.seed = 2;
   unseen.seed = 3;
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  const auto problem = identify::problem_of(bench_logs({fan, still}), motor);
+  const auto problem = identify::problem_of(tests::bench_logs({fan, still}), tests::ec_16());
   int cause = identify::cause_named("cooling_change");
   while (identify::causes()[static_cast<std::size_t>(cause)].edit != identify::Edit::cooling_of_log) ++cause;
   identify::HoldOut held;
-  held.logs = bench_logs({unseen});
+  held.logs = tests::bench_logs({unseen});
   identify::Report report;
   const auto base = identify::fit(problem, {}), extended = identify::fit(problem, {{cause, 0}});
   const auto scored =
@@ -129,11 +112,10 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
   tests::BenchOptions fitted, held_out;
   for (auto* o : {&fitted, &held_out}) o->core_every_s = 20;
   held_out.seed = 2;
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
   const auto sentence = [&] {
     identify::HoldOut held;
-    held.logs = bench_logs({held_out});
-    const identify::Report report = identify::discover(bench_logs({fitted}), motor, held);
+    held.logs = tests::bench_logs({held_out});
+    const identify::Report report = identify::discover(tests::bench_logs({fitted}), tests::ec_16(), held);
     EXPECT_NE(report.verdict, "unknown_cause");
     const json told = json::parse(identify::as_json(report))["held_out"]["against"];
     EXPECT_EQ(told.is_null(), report.sentence.find("held out") == std::string::npos) << told;
@@ -151,10 +133,9 @@ TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousin
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.seconds = 2400;
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  EXPECT_EQ(identify::discover(bench_logs({options}), motor).core_refusal, "");
+  EXPECT_EQ(identify::discover(tests::bench_logs({options}), tests::ec_16()).core_refusal, "");
   options.motor.copper = 0;
-  const identify::Report report = identify::discover(bench_logs({options}), motor);
+  const identify::Report report = identify::discover(tests::bench_logs({options}), tests::ec_16());
   ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
   EXPECT_EQ(report.causes[0].id, "copper_coefficient");
   EXPECT_NE(report.core_refusal, "");
@@ -191,14 +172,13 @@ TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   one.power_gain = 1;
   other.power_gain = 1.4;  // recorded over true
   other.seed = 2;
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  const identify::Report report = identify::discover(bench_logs({one, other}), motor);
+  const identify::Report report = identify::discover(tests::bench_logs({one, other}), tests::ec_16());
   ASSERT_EQ(report.verdict, "explained") << report.sentence;
   ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
   EXPECT_EQ(report.causes[0].id, "power_share");
   EXPECT_NEAR(std::abs(std::log(report.causes[0].parameters[0].value)), std::log(1.4), 0.02);
   other.power_gain = 1;
-  EXPECT_EQ(identify::discover(bench_logs({one, other}), motor).verdict, "adequate");
+  EXPECT_EQ(identify::discover(tests::bench_logs({one, other}), tests::ec_16()).verdict, "adequate");
 }
 
 TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
@@ -222,9 +202,7 @@ TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
 TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
   tests::BenchOptions options;
   options.core_every_s = 20;
-  const auto path = tests::write_bench_log("hotcore_cautious.csv", options);
-  const auto problem = identify::problem_of(identify::logs_of(identify::read_table(path), {}, std::nullopt),
-                                            wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  const auto problem = identify::problem_of(tests::bench_logs({options}), tests::ec_16());
   const identify::Fit found = identify::fit(problem, {});
   identify::Fit light = found, heavy = found;
   light.x[2] -= 0.5;  // ln of the winding's capacity
@@ -237,7 +215,7 @@ TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
 TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
   tests::BenchOptions options;
   options.seconds = 120;
-  auto logs = bench_logs({options, options});
+  auto logs = tests::bench_logs({options, options});
   logs[1].name = "the other";
   logs[1].of(identify::Role::speed).clear();
   const auto notes = identify::discover(logs, std::nullopt).notes;
@@ -251,7 +229,8 @@ TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   tests::BenchOptions options;
   options.seconds = 120;
   std::string said;
-  for (const std::string& note : identify::discover(bench_logs({options}), std::nullopt).notes) said += note + "\n";
+  for (const std::string& note : identify::discover(tests::bench_logs({options}), std::nullopt).notes)
+    said += note + "\n";
   EXPECT_NE(said.find("3/4 of the resistance between two terminals, 3/2 of a phase's"), std::string::npos) << said;
 }
 
@@ -438,7 +417,7 @@ TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
 TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
   tests::BenchOptions options;
   options.power_gain = 1;
-  auto logs = bench_logs({options});
+  auto logs = tests::bench_logs({options});
   auto& speed = logs[0].of(identify::Role::speed);
   for (std::size_t i = 0; i < speed.size(); ++i) speed[i] = i / 500 % 2 == 0 ? 100 : 0;
   const identify::Report report = identify::discover(logs, std::nullopt);

@@ -19,7 +19,7 @@
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
 #include "identify/table.hpp"
-#include "tests/identify/bench_log.hpp"
+#include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/score_table.hpp"
 #include "tests/identify/slow_build.hpp"
@@ -449,10 +449,7 @@ TEST(Search, ACauseThatOnlyItsBoundHoldsExplainsNothing) {
   options.core_every_s = 20;
   options.motor.copper = 0.014;
   options.current_A = [](double t, std::mt19937_64&) { return t < 30 || t > 750 ? 0 : 1.2 + 0.6 * std::sin(t / 40); };
-  const auto logs =
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_bound.csv", options)), {}, std::nullopt);
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  const auto found = identify::search(identify::problem_of(logs, motor));
+  const auto found = identify::search(identify::problem_of(tests::bench_logs({options}), tests::ec_16()));
   EXPECT_EQ(found.verdict, Verdict::unknown_cause) << found.steps.back();
 }
 
@@ -466,11 +463,9 @@ TEST(Search, AnOffsetOfAMotorThatRunsOneWayIsFoundToo) {
     if (t >= until) now = uniform(random) < 0.3 ? 0 : 4 * uniform(random), until = t + 5 + 55 * uniform(random);
     return now;
   };
-  auto logs =
-      identify::logs_of(identify::read_table(tests::write_bench_log("hotcore_one_way.csv", options)), {}, std::nullopt);
+  auto logs = tests::bench_logs({options});
   for (double& i : logs[0].of(identify::Role::current)) i += 0.4;
-  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  const auto found = identify::search(identify::problem_of(logs, motor));
+  const auto found = identify::search(identify::problem_of(logs, tests::ec_16()));
   ASSERT_TRUE(names(found)) << found.steps.back();
   EXPECT_EQ(found.tied.front(), std::vector<std::string>{"current_offset"});
 }
@@ -517,11 +512,7 @@ Problem of_wandering_heat(double core_every_s, double core_white_K) {
   tests::BenchOptions o;
   o.white_K = 0.03, o.slow_K = 0.02, o.step_K = 0, o.core_every_s = core_every_s, o.core_white_K = core_white_K;
   o.extra_housing_W = [](double t, double, double) { return 1 + 0.3 * std::sin(t / 30); };
-  const std::string name =
-      std::string("hotcore_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
-  return identify::problem_of(
-      identify::logs_of(identify::read_table(tests::write_bench_log(name, o)), {}, std::nullopt),
-      wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors"));
+  return identify::problem_of(tests::bench_logs({o}), tests::ec_16());
 }
 
 TEST(Search, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
@@ -681,7 +672,7 @@ TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
 }
 
 TEST(Causes, BoundsHoldWhateverHostSimHides) {
-  const wire::Motor sheet = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors").motor;
+  const wire::Motor sheet = tests::ec_16().motor;
   int compared = 0;
   for (const host_sim::HiddenCause& hidden : host_sim::hidden_causes()) {
     if (!hidden.in_catalogue) continue;
