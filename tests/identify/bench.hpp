@@ -3,9 +3,12 @@
 #pragma once
 
 #include <initializer_list>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "identify/log.hpp"
+#include "identify/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "wire/pc/motor_file.hpp"
 

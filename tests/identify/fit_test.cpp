@@ -9,12 +9,14 @@
 #include "identify/structure.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench.hpp"
+#include "tests/identify/says.hpp"
 
 namespace {
 
 using identify::Chosen;
 using identify::Fit;
 using identify::Problem;
+using tests::says;
 
 const auto sheet = tests::ec_16();
 
@@ -401,7 +403,7 @@ TEST(Refusal, HousingAloneWithConstantResistanceGivesNoCoreTemperature) {
   options.motor.copper = 0;
   const Problem problem = problem_from(options);
   const Fit f = identify::fit(problem, {});
-  EXPECT_NE(identify::core_refusal(problem, f).find("No winding temperature is stated"), std::string::npos);
+  says(identify::core_refusal(problem, f), "No winding temperature is stated");
   EXPECT_GT(identify::sd_from_data(f, 0), 1) << "the data must not claim to know R1";
 }
 
@@ -494,7 +496,7 @@ TEST(Bins, SquaresTakeTheCurrentWithItsRippleAndMagnitudesTheTorqueCurrent) {
   const identify::Bins refused = identify::bins_of(log, 2);
   EXPECT_DOUBLE_EQ(refused.bins.front().input[thermal::Drive::current_A], 5);
   ASSERT_EQ(refused.notes.size(), 2u);
-  EXPECT_NE(refused.notes.front().find("check both units"), std::string::npos) << refused.notes.front();
+  says(refused.notes.front(), "check both units");
 }
 
 /// Currents that step anywhere, a winding read all the time or (`every` rows) now and then.

@@ -12,6 +12,7 @@
 #include "identify/log.hpp"
 #include "identify/masks.hpp"
 #include "identify/units.hpp"
+#include "tests/identify/says.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
@@ -19,6 +20,7 @@ namespace {
 using identify::ColumnMap;
 using identify::Log;
 using identify::Role;
+using tests::says;
 using wire::pc::UserError;
 
 std::string file(const std::string& text) {
@@ -42,12 +44,6 @@ std::string complaint(const std::string& text, const ColumnMap& map = {}, int co
   }
   ADD_FAILURE() << "read without a complaint";
   return "";
-}
-
-bool says(const std::string& sentence, const std::string& part) {
-  if (sentence.find(part) != std::string::npos) return true;
-  ADD_FAILURE() << "'" << sentence << "' does not say '" << part << "'";
-  return false;
 }
 
 const std::string head = "time_s,current_A,housing_degC\n";

@@ -15,15 +15,16 @@
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
 #include "identify/parallel.hpp"
-#include "identify/table.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
+#include "tests/identify/says.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "tests/identify/traction.hpp"
 
 namespace {
 
 using nlohmann::json;
+using tests::says;
 
 identify::Report report_of(const tests::BenchOptions& options, const identify::HoldOut& held = {}) {
   return identify::discover(tests::bench_logs({options}), tests::ec_16(), held);
@@ -84,7 +85,7 @@ TEST(Report, ACauseThatDoesNotGoOnIsRefusedByTheDataNotFitted) {
   };
   // A warm wind in the last of what is fitted looks like a drift, which the data after it does not go on with.
   options.extra_housing_W = [](double t, double, double) { return t > 750 && t < 900 ? 1.0 : 0.0; };
-  EXPECT_NE(veto("ambient_drift").find("refused"), std::string::npos);
+  says(veto("ambient_drift"), "refused");
   options.extra_housing_W = [](double t, double, double) { return 0.001 * t; };
   EXPECT_EQ(veto("ambient_drift"), "");
 }
@@ -123,10 +124,10 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
   };
   EXPECT_EQ(sentence().find("held out"), std::string::npos);
   held_out.motor.R2 *= 2;  // in still air, say
-  EXPECT_NE(sentence().find("something in it is not in what was fitted"), std::string::npos) << sentence();
+  says(sentence(), "something in it is not in what was fitted");
   held_out.motor.R2 /= 2;
   fitted.extra_housing_W = [](double t, double, double) { return 0.003 * t; };  // a room that warms, but there
-  EXPECT_NE(sentence().find("do not rely on it"), std::string::npos) << sentence();
+  says(sentence(), "do not rely on it");
 }
 
 TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousing) {
@@ -195,8 +196,8 @@ TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
   for (const char* key : {"overshoot_before_K", "overshoot_after_K", "burst_s_before", "burst_s_after",
                           "continuous_A_before", "continuous_A_after"})
     EXPECT_TRUE(gain.at(key).is_number()) << key;
-  EXPECT_NE(identify::as_text(report, false).find("What it is worth"), std::string::npos);
-  EXPECT_NE(identify::as_html(report).find("What it is worth"), std::string::npos);
+  says(identify::as_text(report, false), "What it is worth");
+  says(identify::as_html(report), "What it is worth");
 }
 
 TEST(Report, OfModelsThatCannotBeToldApartTheMostCautiousIsTaken) {
@@ -231,7 +232,7 @@ TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   std::string said;
   for (const std::string& note : identify::discover(tests::bench_logs({options}), std::nullopt).notes)
     said += note + "\n";
-  EXPECT_NE(said.find("3/4 of the resistance between two terminals, 3/2 of a phase's"), std::string::npos) << said;
+  says(said, "3/4 of the resistance between two terminals, 3/2 of a phase's");
 }
 
 TEST(Report, WhatIsAdequateHasNothingToGain) {
@@ -269,13 +270,13 @@ void refused(const std::string& path, const std::string& because) {
   const Outcome r = run(path + " --motor ec-16-40w");
   EXPECT_TRUE(r.code == 3 || r.out.find("Verdict: insufficient") != std::string::npos) << r.out;
   EXPECT_EQ(r.out.find("behaves"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find(because), std::string::npos) << r.out;
+  says(r.out, because);
 }
 
 TEST(BadInput, AGoodLogIsAnsweredUntilItIsSpoilt) {
   const Outcome r = run(spoilt([](auto&, int) { return true; }) + " --motor ec-16-40w");
   EXPECT_EQ(r.code, 0);
-  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
+  says(r.out, "Verdict: adequate");
 }
 
 TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
@@ -287,9 +288,8 @@ TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
                           return true;
                         }) +
                         " --motor ec-16-40w");
-  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find("housing_degC was filled in by repeating between readings about 1 s apart"), std::string::npos)
-      << r.out;
+  says(r.out, "Verdict: adequate");
+  says(r.out, "housing_degC was filled in by repeating between readings about 1 s apart");
 }
 
 TEST(BadInput, ALoadThatNeverChanges) {
@@ -310,7 +310,7 @@ TEST(BadInput, NoTemperatureBeforeWhatIsHeldOut) {
   });
   const Outcome r = run(path + " --motor ec-16-40w --hold-out 0.25");
   EXPECT_EQ(r.code, 3);
-  EXPECT_NE(r.out.find("no temperature is read in its 675 s; hold out less"), std::string::npos) << r.out;
+  says(r.out, "no temperature is read in its 675 s; hold out less");
 }
 
 TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
@@ -323,7 +323,7 @@ TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
   const std::string path = (std::filesystem::temp_directory_path() / "hotcore_five_minutes.csv").string();
   tests::make_hidden_log(o, path);
   const Outcome r = run(path);
-  EXPECT_NE(r.out.find("does not come near where it settles"), std::string::npos) << r.out;
+  says(r.out, "does not come near where it settles");
 }
 
 TEST(BadInput, NothingThatVaries) {
@@ -339,7 +339,7 @@ TEST(BadInput, TimeInMilliseconds) {
   const auto in_ms = [](auto& row, int number) { return row[0] = std::to_string(number * 100), true; };
   refused(spoilt(in_ms), "check the units of current and time");
   const Outcome without_sheet = run(spoilt(in_ms));
-  EXPECT_NE(without_sheet.out.find("--column time_s=COLUMN:ms"), std::string::npos) << without_sheet.out;
+  says(without_sheet.out, "--column time_s=COLUMN:ms");
 }
 
 TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
@@ -348,21 +348,21 @@ TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
   options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
   const Outcome r =
       run(spoilt([](auto& row, int number) { return row[0] = std::to_string(number * 100), true; }, options));
-  EXPECT_NE(r.out.find("Verdict: insufficient"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find("--column time_s=COLUMN:ms"), std::string::npos) << r.out;
+  says(r.out, "Verdict: insufficient");
+  says(r.out, "--column time_s=COLUMN:ms");
 }
 
 TEST(BadInput, TimeInMinutes) {
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
   const Outcome r = run(spoilt(in_min));
-  EXPECT_NE(r.out.find("Verdict: insufficient"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find("--column time_s=COLUMN:min"), std::string::npos) << r.out;
+  says(r.out, "Verdict: insufficient");
+  says(r.out, "--column time_s=COLUMN:min");
 }
 
 TEST(BadInput, TheSheetOfAnotherMotor) {
   const auto as_it_is = [](auto&, int) { return true; };
   const Outcome near = run(spoilt(as_it_is) + " --motor ec-powermax-30-48v");
-  EXPECT_NE(near.out.find("times the sheet's; see whether maxon EC-powermax 30"), std::string::npos) << near.out;
+  says(near.out, "times the sheet's; see whether maxon EC-powermax 30");
   tests::BenchOptions insulated;
   insulated.motor.R1 = 45;
   insulated.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 200) < 100 ? 1.2 : 0.3; };
@@ -372,8 +372,8 @@ TEST(BadInput, TheSheetOfAnotherMotor) {
 TEST(BadInput, APauseInWhichTheMotorRanOn) {
   const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
   const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");
-  EXPECT_NE(r.out.find("Verdict: adequate"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find("Nothing tells the heat input for 60 s from 400 s"), std::string::npos) << r.out;
+  says(r.out, "Verdict: adequate");
+  says(r.out, "Nothing tells the heat input for 60 s from 400 s");
 }
 
 TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
@@ -384,8 +384,8 @@ TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
   const auto rows = [&](int apart) {
     return run(spoilt([&](auto&, int row) { return row % apart == 0; }, options) + " --motor ec-16-40w").out;
   };
-  EXPECT_NE(rows(1).find("Verdict: adequate"), std::string::npos) << rows(1);
-  EXPECT_NE(rows(20).find("between rows 2 s apart"), std::string::npos) << rows(20);
+  says(rows(1), "Verdict: adequate");
+  says(rows(20), "between rows 2 s apart");
 }
 
 TEST(BadInput, FortyPercentMissing) {
@@ -406,12 +406,10 @@ TEST(BadInput, ATemperatureReadEightTimes) {
 TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
   const Outcome r = run(spoilt([](auto& row, int) { return row[2] = "", true; }) + " --motor ec-16-40w --explain");
   EXPECT_EQ(r.code, 0);
-  EXPECT_NE(r.out.find("Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, "),
-            std::string::npos)
-      << r.out;
+  says(r.out, "Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, ");
   const Outcome stands =
       run(spoilt([](auto& row, int) { return row[2] = "0", true; }) + " --motor ec-16-40w --explain");
-  EXPECT_NE(stands.out.find("speed_rad_per_s never moves ("), std::string::npos) << stands.out;
+  says(stands.out, "speed_rad_per_s never moves (");
 }
 
 TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
@@ -425,7 +423,7 @@ TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
   for (const auto& lines : {report.notes, report.reasoning})
     for (const std::string& line : lines) said += line + "\n";
   EXPECT_EQ(said.find("never moves"), std::string::npos) << said;
-  EXPECT_NE(said.find("power_W tells no current (ac_copper_loss, "), std::string::npos) << said;
+  says(said, "power_W tells no current (ac_copper_loss, ");
 }
 
 TEST(BadInput, TwoClocksTwoMinutesApart) {
@@ -495,7 +493,7 @@ TEST(Report, ThePageIsOneFileAndEscapesWhatItShows) {
   identify::Report report = report_of(options);
   report.notes.push_back("<script>alert(1)</script>");
   const std::string html = identify::as_html(report);
-  EXPECT_NE(html.find("<svg"), std::string::npos);
+  says(html, "<svg");
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(html.find("src="), std::string::npos);
   EXPECT_EQ(html.find("<link"), std::string::npos);
@@ -513,7 +511,7 @@ TEST(Traction, AMinuteSaysNothingOfAMotorWithoutASheet) {
   for (auto& column : logs[0].columns) column.resize(std::min<std::size_t>(column.size(), 120));
   const identify::Report report = identify::discover(logs, std::nullopt);
   EXPECT_EQ(report.verdict, "insufficient");
-  EXPECT_NE(report.sentence.find("does not come near where it settles"), std::string::npos) << report.sentence;
+  says(report.sentence, "does not come near where it settles");
 }
 
 TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
@@ -547,7 +545,7 @@ TEST(Program, UnknownMotorIsAnsweredWithTheNearest) {
   options.seconds = 60;
   const Outcome r = run(tests::write_bench_log("hotcore_motor.csv", options) + " --motor ec-16-40W");
   EXPECT_EQ(r.code, 2);
-  EXPECT_NE(r.out.find("did you mean 'ec-16-40w'?"), std::string::npos) << r.out;
+  says(r.out, "did you mean 'ec-16-40w'?");
 }
 
 TEST(Program, BadDataEndsWithThreeAndWritesNothing) {
@@ -569,7 +567,7 @@ TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
                           " --motor ec-16-40w --json - --write-model " + model);
     EXPECT_EQ(std::filesystem::exists(model), r.code == 0) << r.out;
     EXPECT_EQ(r.out.find("\"no_model\": null") != std::string::npos, r.code == 0) << r.out;
-    EXPECT_NE(r.out.find("\"verdict\":"), std::string::npos) << r.out;
+    says(r.out, "\"verdict\":");
     return r;
   };
   tests::BenchOptions options;
@@ -580,7 +578,7 @@ TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
   options.power_gain = 1;
   const Outcome r = asked(options);
   EXPECT_EQ(r.code, 3);
-  EXPECT_NE(r.out.find("not written: the log tells a power"), std::string::npos) << r.out;
+  says(r.out, "not written: the log tells a power");
 }
 
 TEST(Program, AFolderThatIsNotThereIsNotMade) {
@@ -591,7 +589,7 @@ TEST(Program, AFolderThatIsNotThereIsNotMade) {
   for (const char* option : {"--json", "--html", "--write-model", "--write-baseline"}) {
     const Outcome r = run(log + " " + option + " " + folder + "/x");
     EXPECT_EQ(r.code, 2);
-    EXPECT_NE(r.out.find("there is no folder " + folder), std::string::npos) << r.out;
+    says(r.out, "there is no folder " + folder);
     EXPECT_FALSE(std::filesystem::exists(folder));
   }
 }
@@ -610,12 +608,9 @@ TEST(Program, ColumnsMayFollowOneWord) {
   tests::BenchOptions options;
   options.seconds = 60;
   const std::string path = tests::write_bench_log("hotcore_columns.csv", options);
-  EXPECT_NE(
-      run("--column ambient_degC=sky coolant_degC=sea " + path).out.find("column 'sky' for ambient_degC is missing"),
-      std::string::npos);
-  EXPECT_NE(run(path + " --column ambient_degC=ambient_degC coolant_degC=sea")
-                .out.find("column 'sea' for coolant_degC is missing"),
-            std::string::npos);
+  says(run("--column ambient_degC=sky coolant_degC=sea " + path).out, "column 'sky' for ambient_degC is missing");
+  says(run(path + " --column ambient_degC=ambient_degC coolant_degC=sea").out,
+       "column 'sea' for coolant_degC is missing");
   EXPECT_EQ(run("--column ambient_degC=sky coolant_degC=sea").code, 2) << "no log";
 }
 
@@ -640,7 +635,7 @@ TEST(Program, AScoreEndsWithWhatWasTakenForWhat) {
   const std::string table = row("truth \\ answer", "   1   2") + row("board_heat", "   .   1") +
                             row("nothing", "   2   .") + row("windage", "   1   .") +
                             "   1  adequate\n   2  board_heat\n";
-  EXPECT_NE(r.out.find(table), std::string::npos) << r.out;
+  says(r.out, table);
 }
 
 TEST(Program, ALogWithoutLoadCannotBeUsed) {
@@ -649,7 +644,7 @@ TEST(Program, ALogWithoutLoadCannotBeUsed) {
   options.current_A = [](double, std::mt19937_64&) { return 0.0; };
   const Outcome r = run(tests::write_bench_log("hotcore_idle.csv", options));
   EXPECT_EQ(r.code, 3);
-  EXPECT_NE(r.out.find("no current and no power flows"), std::string::npos) << r.out;
+  says(r.out, "no current and no power flows");
 }
 
 TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
@@ -673,7 +668,7 @@ TEST(MeasuredData, AFanMakesNoSessionTooShort) {
   const std::string still = data + "tass_run1.csv " + data + "tass_run3.csv ";
   const std::string all = said(still + data + "tass_run4_fan.csv");
   EXPECT_EQ(all.find("Verdict: insufficient"), std::string::npos) << all;
-  EXPECT_NE(said(still).find("less than the housing's time constant"), std::string::npos);
+  says(said(still), "less than the housing's time constant");
 }
 
 json answer(const std::string& arguments) {
@@ -701,7 +696,7 @@ TEST(MeasuredData, EveryAnswerHoldsTheFanAndTheJointModelMissesByFiveKelvin) {
   EXPECT_LE(j["tied"].size(), 4u) << j["sentence"];
   EXPECT_LT(j["rmse_with_causes_K"]["core"], 5.3);
   EXPECT_LT(j["rmse_with_causes_K"]["housing"], 2.5);
-  EXPECT_NE(j["causes"][0]["name"].get<std::string>().find("tass_run4_fan"), std::string::npos) << j["causes"][0];
+  says(j["causes"][0]["name"], "tass_run4_fan");
 }
 
 TEST(MeasuredData, AtOneSpeedHeatThatDoesNotFollowTheCurrentIsNoMoreThanThat) {

@@ -21,6 +21,7 @@
 #include "identify/table.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
+#include "tests/identify/says.hpp"
 #include "tests/identify/score_table.hpp"
 #include "tests/identify/slow_build.hpp"
 #include "thermal/network.hpp"
@@ -29,6 +30,7 @@
 namespace {
 
 using identify::Problem, identify::Verdict;
+using tests::says;
 
 struct Hidden {
   identify::Problem problem;
@@ -601,15 +603,14 @@ TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
   EXPECT_EQ(nothing.verdict, "adequate");
   EXPECT_EQ(nothing.model_toml.find("hot spot"), std::string::npos);
   ASSERT_EQ(small.verdict, "adequate");
-  EXPECT_NE(small.model_toml.find("hot spot"), std::string::npos) << small.model_toml;
+  says(small.model_toml, "hot spot");
 }
 
 TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
   ASSERT_EQ(report.verdict, "unknown_cause");
-  EXPECT_NE(report.model_toml.find("power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n"), std::string::npos)
-      << report.model_toml;
+  says(report.model_toml, "power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n");
 }
 
 TEST(Report, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
@@ -619,7 +620,7 @@ TEST(Report, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
   std::swap(log.logs[0].of(identify::Role::core), log.logs[0].of(identify::Role::housing));
   const auto report = identify::discover(log.logs, log.log.sheet);
   EXPECT_EQ(report.verdict, "insufficient");
-  EXPECT_NE(report.sentence.find("core_degC and housing_degC are swapped"), std::string::npos) << report.sentence;
+  says(report.sentence, "core_degC and housing_degC are swapped");
 }
 
 TEST(ModelFile, TrustIsInWhatTheBoardsHeatDependsOn) {
