@@ -148,7 +148,7 @@ HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldO
     for (Chosen& c : elsewhere.chosen) c.log = -1;
     before = transferred(unseen, base);
     after = transferred(unseen, elsewhere);
-    out.before = rmse_of(unseen, before, &out.each_before);
+    out.before = rmse_of(unseen, before, several ? &out.each_before : nullptr);
   }
   out.after = rmse_of(unseen, after);
   judge(unseen, before, after, held.draws, report, out);

@@ -60,7 +60,7 @@ struct HeldOut {
   int blocks = 0;                               // of a minute
   std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few
   std::string against;                          // how it speaks against the answer; empty: it does not
-  std::vector<Rmse> each_before;                // per log, when whole logs were held out
+  std::vector<Rmse> each_before;                // per log, when several were held out
   std::vector<std::string> names;
 };
 

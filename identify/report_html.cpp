@@ -162,7 +162,7 @@ std::string errors(const Report& r) {
   for (const Variant& v : r.variants) line("two-resistor model, " + v.what, v.rmse);
   if (!r.causes.empty()) line("extended model, fitted", r.extended_rmse);
   if (r.held_out) {
-    for (std::size_t i = 0; i < r.held_out->each_before.size() && r.held_out->each_before.size() > 1; ++i)
+    for (std::size_t i = 0; i < r.held_out->each_before.size(); ++i)
       line("not seen: " + r.held_out->names[i], r.held_out->each_before[i]);
     line("not seen (" + r.held_out->how + ")", r.held_out->before);
     if (!r.causes.empty()) line("the same, extended model", r.held_out->after);

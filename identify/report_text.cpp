@@ -102,7 +102,7 @@ std::string unseen(const Report& r) {
   if (!r.held_out) return "";
   const HeldOut& h = *r.held_out;
   std::string s = fmt::format("\nOn data it has not seen ({})\n  before: {}\n", h.how, rmse(h.before));
-  for (std::size_t i = 0; i < h.each_before.size() && h.each_before.size() > 1; ++i)
+  for (std::size_t i = 0; i < h.each_before.size(); ++i)
     s += fmt::format("    {}: {}\n", h.names[i], rmse(h.each_before[i]));
   if (!r.causes.empty()) s += "  after:  " + rmse(h.after) + "\n";
   if (!h.nearest.empty()) s += fmt::format("  {}: {}\n", nearest_words(h), rmse(h.after));
