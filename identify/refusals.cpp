@@ -314,7 +314,7 @@ std::string too_sparse(const Problem& problem, const Search& found, const std::v
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
   // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
   constexpr double times = 2.5, worth_K = 0.02;
-  if (open_K < worth_K || left_K > times * open_K) return "";
+  if (std::min(open_K, left_K) < worth_K || left_K > times * open_K) return "";
   double apart_s = 0;
   for (const Bins& log : problem.logs) apart_s = std::max(apart_s, log.interval_s);
   return fmt::format(

@@ -15,6 +15,7 @@
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
 #include "identify/parallel.hpp"
+#include "identify/refusals.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/says.hpp"
@@ -386,6 +387,26 @@ TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
   };
   says(rows(1), "Verdict: adequate");
   says(rows(20), "between rows 2 s apart");
+}
+
+TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
+  tests::BenchOptions options;
+  options.rate_Hz = 0.5;
+  options.seconds = 1800;
+  options.slow_K = 0;
+  options.current_A = [](double t, std::mt19937_64&) { return 1.2 + 0.8 * std::sin(t / 40); };
+  const auto motor = tests::ec_16();
+  const auto refusal = [&] {
+    const auto logs = tests::bench_logs({options});
+    const auto problem = identify::problem_of(logs, motor);
+    identify::Search found;
+    found.verdict = identify::Verdict::unknown_cause;
+    found.base.fit = found.chosen.fit = identify::fit(problem, {});
+    return identify::too_sparse(problem, found, logs);
+  };
+  EXPECT_EQ(refusal(), "");
+  options.extra_housing_W = [](double t, double, double) { return 0.02 * std::sin(t / 90); };
+  EXPECT_NE(refusal(), "") << "what is left is no more than the load between rows may do";
 }
 
 TEST(BadInput, FortyPercentMissing) {
