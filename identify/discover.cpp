@@ -341,6 +341,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     found.verdict = Verdict::insufficient;
     report.verdict = word(found.verdict);
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
+    report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);

@@ -355,9 +355,10 @@ TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
 
 TEST(BadInput, TimeInMinutes) {
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
-  const Outcome r = run(spoilt(in_min));
+  const Outcome r = run(spoilt(in_min) + " --explain");
   says(r.out, "Verdict: insufficient");
   says(r.out, "--column time_s=COLUMN:min");
+  says(r.out, "The two-resistor model was fitted; what it leaves is");
 }
 
 TEST(BadInput, TheSheetOfAnotherMotor) {
