@@ -77,19 +77,20 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
 
 /// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
-std::string misread_columns(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
+std::string misread_columns(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
   const Fit two = fit(problem, {});
-  const double as_it_stands = excess(two), explained = excess(fit(problem, best.chosen, {&best}));
-  const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen) {
+  const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
+  const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
+  const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
     const double left = excess(fit(read, chosen));
     return left + clearly < explained && left < 0.25 * as_it_stands;
   };
   const auto follows_better = [&](const std::vector<Log>& otherwise) {
     const Problem read = problem_of(otherwise, motor);
-    return leaves_less(read, {}) || leaves_less(read, best_alone(read).chosen);
+    return leaves_less(read, {}, by_one) || leaves_less(read, best_alone(read).chosen, by_one);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
     return log.has(Role::current) && largest_magnitude(log.of(Role::speed)) > 0;
@@ -100,7 +101,9 @@ std::string misread_columns(const Problem& problem, const Fit& best, const std::
   if (turns && !either && !problem.heated_by_power()) {
     std::vector<Log> swapped = logs;
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
-    if (leaves_less(problem_of(swapped, motor), {}))
+    // Of a unit that would prove nothing: a gain and an offset imitate Fahrenheit.
+    const double explained = std::min(by_one, left_by(found.chosen.fit));
+    if (leaves_less(problem_of(swapped, motor), {}, explained))
       return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
              "swapped; map them with --column.";
   }
@@ -289,7 +292,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
     }
     at += static_cast<Eigen::Index>(cause.parameters.size());
   }
-  const std::string misread = misread_columns(problem, best, logs, motor);
+  const std::string misread = misread_columns(problem, found, logs, motor);
   if (!misread.empty()) return misread;
   // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which. So does a
   // motor that is more than two masses; read the other way round it does not follow the load.

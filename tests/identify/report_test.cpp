@@ -496,6 +496,31 @@ TEST(BadInput, CurrentAndSpeedSwapped) {
           "follow the square of the speed column and not that of the current: the two columns are swapped");
 }
 
+TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLog) {
+  const auto speed_rad_per_s = [](double t) { return std::fmod(t, 200) < 100 ? 2 : 0.5; };
+  tests::BenchOptions options;
+  options.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 130) < 60 ? 0.4 : 0.1; };
+  options.extra_housing_W = [&](double t, double, double) { return std::pow(speed_rad_per_s(t), 2); };
+  auto logs = bench_logs({options});
+  for (std::size_t i = 0; i < logs[0].of(identify::Role::time).size(); ++i)
+    logs[0].of(identify::Role::speed)[i] = speed_rad_per_s(logs[0].of(identify::Role::time)[i]);
+  const auto problem = identify::problem_of(logs, std::nullopt);
+  const auto fitted = [&](const char* id) {
+    identify::Candidate out;
+    out.fit = identify::fit(problem, {{identify::cause_named(id)}});
+    return out;
+  };
+  identify::Search found;
+  found.verdict = identify::Verdict::explained;
+  found.base.fit = identify::fit(problem, {});
+  found.singles = {fitted("sensor_offset")};
+  found.chosen = found.singles.front();
+  EXPECT_NE(identify::suspicion(problem, found, logs, std::nullopt).find("the two columns are swapped"),
+            std::string::npos);
+  found.chosen = fitted("speed_loss_quadratic");
+  EXPECT_EQ(identify::suspicion(problem, found, logs, std::nullopt), "");
+}
+
 TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
