@@ -64,9 +64,35 @@ std::vector<double> medians_around(const std::vector<double>& v, double usual_s)
   return out;
 }
 
+/// From the first row that told another degree to the last of a flutter about the same step.
+struct Step {
+  std::size_t first, last;
+  double degC;
+};
+
+/// Steps at one degree are one flutter while they follow each other within a share of the time that the way to another
+/// degree takes: in longer the truth may have left it and come back.
+std::vector<Step> flutters_of(const std::vector<Step>& steps, const std::vector<double>& t, double share,
+                              double least_s) {
+  std::vector<Step> out;
+  for (std::size_t from = 0, to = 0; from < steps.size(); from = to) {
+    while (to < steps.size() && steps[to].degC == steps[from].degC) ++to;
+    double degree_s = t.back();
+    if (from > 0) degree_s = t[steps[from].first] - t[steps[from - 1].last];
+    if (to < steps.size()) degree_s = std::min(degree_s, t[steps[to].first] - t[steps[to - 1].last]);
+    const double flutter_s = std::max(least_s, share * degree_s);
+    for (std::size_t k = from; k < to; ++k) {
+      if (k == from || t[steps[k].first] - t[out.back().last] > flutter_s) out.push_back(steps[k]);
+      out.back().last = steps[k].last;
+    }
+  }
+  return out;
+}
+
 /// A sensor that tells whole degrees says where it is only as it steps: there the truth lies half way, and in between
-/// it may be anywhere. A flutter about one step is one reading, at its middle. Of steps that follow each other within a
-/// second the moments are not known well enough.
+/// it may be anywhere. A flutter about one step is one reading, at its middle; of a housing none where it ends as it
+/// began, while a winding does go and come back within seconds. Of steps to different degrees that follow each other
+/// within a second the moments are not known well enough.
 void read_between_steps(Log& log, Role role) {
   // Of the steps of housings none followed another within a second; of sensors that feel a winding, a tenth and more
   // did (score's motors, whole degrees, seeds 1 to 5).
@@ -77,10 +103,6 @@ void read_between_steps(Log& log, Role role) {
   const double step_K = step_of(v);
   if (step_K < coarse_K || 2 * count_told(v) < v.size()) return;
 
-  struct Step {
-    std::size_t first, last;
-    double degC;
-  };
   std::vector<Step> steps;
   const double usual_s = t.back() / static_cast<double>(t.size() - 1), apart_s = std::max(hurry_s, 2.5 * usual_s);
   const std::vector<double> settled = medians_around(v, usual_s);
@@ -88,15 +110,18 @@ void read_between_steps(Log& log, Role role) {
     const double moved_K = std::abs(settled[i] - settled[i - 1]);
     if (std::isnan(moved_K) || moved_K == 0) continue;
     if (t[i] - t[i - 1] > apart_s) continue;  // when in a gap is not known
-    const double degC = (settled[i] + settled[i - 1]) / 2;
-    if (steps.empty() || steps.back().degC != degC || t[i] - t[steps.back().last] > flutter_s)
-      steps.push_back({i, i, degC});
-    steps.back().last = i;
+    steps.push_back({i, i, (settled[i] + settled[i - 1]) / 2});
   }
+  const double share = role == Role::housing ? 0.25 : 0;
+  steps = flutters_of(steps, t, share, std::max(flutter_s, apart_s));
+  if (role == Role::housing)
+    std::erase_if(steps, [&](const Step& step) { return settled[step.last] == settled[step.first - 1]; });
+  const auto hurried = [&](const Step& one, const Step& next) {
+    return one.degC != next.degC && t[next.first] - t[one.last] < apart_s;
+  };
   std::vector<Step> unhurried;
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    if ((k == 0 || t[steps[k].first] - t[steps[k - 1].last] >= apart_s) &&
-        (k + 1 == steps.size() || t[steps[k + 1].first] - t[steps[k].last] >= apart_s))
+    if ((k == 0 || !hurried(steps[k - 1], steps[k])) && (k + 1 == steps.size() || !hurried(steps[k], steps[k + 1])))
       unhurried.push_back(steps[k]);
   }
   if (unhurried.size() < least_steps) return;

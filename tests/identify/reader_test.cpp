@@ -578,6 +578,26 @@ TEST(Masks, ASensorOfWholeDegreesIsReadAsItSteps) {
   EXPECT_EQ(log_of(0.1, 0, 1).housing_step_K, 0) << "fine steps";
   EXPECT_EQ(log_of(1, 0, 30).housing_step_K, 0) << "six degrees a second";
 }
+TEST(Masks, AFlutterAboutOneDegreeIsOneStepHoweverLongItLasts) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  const auto truth_degC = [](double t) { return 25 + 12 * std::sin(t / 1900); };  // a degree in 160 s at the fastest
+  for (const double noise_K : {0.05, 0.1, 0.2}) {
+    std::string text = head;
+    for (int t = 0; t < 23876; t += 2)  // two periods
+      text += std::to_string(t) + ",1," + std::to_string(std::round(truth_degC(t) + noise_K * normal(random))) + "\n";
+    const Log log = read(text)[0];
+    ASSERT_EQ(log.housing_step_K, 1) << noise_K;
+    int readings = 0;
+    for (std::size_t i = 0; i < log.of(Role::time).size(); ++i) {
+      const double degC = log.of(Role::housing)[i];
+      if (std::isnan(degC)) continue;
+      EXPECT_NEAR(degC, truth_degC(log.of(Role::time)[i]), 3 * 0.15) << noise_K;
+      ++readings;
+    }
+    EXPECT_NEAR(readings, 4 * 24, 10) << noise_K << ": each step up and down, twice";
+  }
+}
 TEST(Masks, RowsMissingOneByOneAreCounted) {
   std::string text = head;
   for (int i = 0; i < 400; ++i) {
