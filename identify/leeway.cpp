@@ -10,8 +10,9 @@ namespace {
 /// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
 /// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
-/// When in its row's interval a dense winding was read, or the current: anywhere in it, this standard deviation.
-const double ordinary_moment_share = 1 / std::sqrt(12.0);
+/// A row's current may flow until the next row, have flowed since the row before, or anything between: the winding read
+/// beside it is up to an interval ahead of it, evenly likely, the root of whose mean square this is.
+const double ordinary_moment_share = 1 / std::sqrt(3.0);
 /// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
 /// deviation.
 const double ordinary_uneven_share = 1 / std::sqrt(3.0);
@@ -46,15 +47,14 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   const Fit two_resistors = bare(motor);
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  // Short: they show the slope, and early is the reverse of late; in sharp bursts a delay shows it in hundredths.
-  constexpr double lag_s = 0.2, delay_s = 0.01;
+  constexpr double lag_s = 0.2;  // short: it shows the slope
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
   });
   const Fit& prompt = sensor ? two_resistors : motor;
-  const Fit late = with_cause(prompt, "sensor_lag", {lag_s}), delayed = with_cause(prompt, "clock_delay", {delay_s});
+  const Fit late = with_cause(prompt, "sensor_lag", {lag_s});
   Fit framed = with_cause(two_resistors, "third_mass",
                           {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
                            std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
@@ -73,14 +73,14 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
-                   warmed = replayed(uneven, motor, l), after = replayed(problem, delayed, l),
-                   heated = replayed(rippling, motor, l);
+                   warmed = replayed(uneven, motor, l), heated = replayed(rippling, motor, l);
     const Replayed& at_once = sensor ? plain : even;
-    const double moment_s = problem.logs[l].interval_s * ordinary_moment_share;
+    // By half of it, since at its ends another load may begin, which then would count for all or for nothing.
+    const Replayed ahead = replayed(problem, with_cause(prompt, "clock_delay", {-problem.logs[l].interval_s / 2}), l);
     lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.core_K.push_back(apart_K(after.core_degC, at_once.core_degC, moment_s / delay_s));
+    moment.core_K.push_back(apart_K(ahead.core_degC, at_once.core_degC, 2 * ordinary_moment_share));
     frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
     phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));

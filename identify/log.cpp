@@ -486,6 +486,17 @@ Log without_last(Log log, double fraction) {
   return log;
 }
 
+Log loaded_before(Log log) {
+  for (const Role role : {Role::current, Role::id, Role::iq, Role::power, Role::speed}) {
+    std::vector<double>& load = log.of(role);
+    if (!load.empty()) std::rotate(load.begin(), load.begin() + 1, load.end()), load.back() = load.end()[-2];
+  }
+  log.loaded_before = true;
+  log.notes.push_back(
+      "Current and speed of a row are taken for those since the row before it: the temperatures ask it.");
+  return log;
+}
+
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
   std::vector<std::string> unit_notes;
   const auto found = resolve(table, map, unit_notes);

@@ -80,6 +80,7 @@ struct Log {
   std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
   double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
+  bool loaded_before = false;     // a row's load flowed since the row before, not until the next one
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
   std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }
@@ -101,6 +102,9 @@ double first_degC(const Log& log);
 
 /// The rows before the last `fraction` of the log's time.
 Log without_last(Log log, double fraction);
+
+/// The same, each row's load taken for what flowed since the row before it; a note says so.
+Log loaded_before(Log log);
 
 /// The logs in a table: one, or one a session. Throws UserError (unusable) in one sentence.
 std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor);

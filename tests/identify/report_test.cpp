@@ -390,6 +390,25 @@ TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
   says(rows(20), "between rows 2 s apart");
 }
 
+/// As an inverter's logger averages: what flowed in the five seconds before a row, beside a winding of 50 s.
+TEST(Report, ARowsLoadMayBeWhatFlowedBeforeIt) {
+  tests::BenchOptions options;
+  options.motor = {.ohm = 0.75, .R1 = 1.0, .R2 = 4.0, .C1 = 50, .C2 = 300};
+  options.rate_Hz = 0.2;
+  options.seconds = 3600;
+  options.core_every_s = 5;
+  options.core_white_K = 0.1;
+  const auto said = [](const std::vector<identify::Log>& logs) {
+    const identify::Report report = identify::discover(logs, std::nullopt);
+    return report.verdict + ": " + report.notes.front();
+  };
+  auto logs = tests::bench_logs({options});
+  says(said(logs), "adequate: No motor file");
+  auto& current = logs[0].of(identify::Role::current);
+  std::rotate(current.begin(), current.end() - 1, current.end());
+  says(said(logs), "adequate: Current and speed of a row are taken for those since the row before it");
+}
+
 TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
   tests::BenchOptions options;
   options.rate_Hz = 0.5;
@@ -501,7 +520,7 @@ TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLo
   tests::BenchOptions options;
   options.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 130) < 60 ? 0.4 : 0.1; };
   options.extra_housing_W = [&](double t, double, double) { return std::pow(speed_rad_per_s(t), 2); };
-  auto logs = bench_logs({options});
+  auto logs = tests::bench_logs({options});
   for (std::size_t i = 0; i < logs[0].of(identify::Role::time).size(); ++i)
     logs[0].of(identify::Role::speed)[i] = speed_rad_per_s(logs[0].of(identify::Role::time)[i]);
   const auto problem = identify::problem_of(logs, std::nullopt);
