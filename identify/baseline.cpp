@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "identify/leeway.hpp"
 #include "wire/pc/user_error.hpp"
@@ -57,7 +56,7 @@ void add_plots(const Problem& problem, const Fit& f, const std::string& remark, 
     const Bins& log = problem.logs[l];
     const Replayed r = replayed(problem, f, l);
     LogPlot plot;
-    plot.name = std::filesystem::path(log.name).filename().string() + remark;
+    plot.name = log.name + remark;
     plot.heat_label = problem.heated_by_power() ? "power, W" : "current, A";
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       const Bin& b = log.bins[k];

@@ -280,6 +280,28 @@ std::string why_no_model(const Problem& problem, const std::string& poor) {
   return problem.heated_by_power() ? "the log tells a power and a board measures a current; record current_A" : "";
 }
 
+/// Each log by its file alone, and by as many of the folders above it as tell it from the others.
+void shorten_names(std::vector<LogPlot>& plots) {
+  const auto last = [](const std::string& path, long parts) {
+    std::size_t cut = path.size();
+    while (parts-- > 0 && cut != std::string::npos && cut > 0) cut = path.rfind('/', cut - 1);
+    return cut == std::string::npos ? path : path.substr(cut + 1);
+  };
+  std::vector<std::string> paths;
+  for (const LogPlot& plot : plots) paths.push_back(plot.name);
+  for (LogPlot& plot : plots) {
+    const std::string path = plot.name;
+    const auto as_short = [&](long parts) {
+      return std::any_of(paths.begin(), paths.end(), [&](const std::string& other) {
+        return other != path && last(other, parts) == last(path, parts);
+      });
+    };
+    long parts = 1;
+    while (parts <= std::count(path.begin(), path.end(), '/') && as_short(parts)) ++parts;
+    plot.name = last(path, parts);
+  }
+}
+
 std::vector<std::string> noise_words(const Problem& problem) {
   const Noise& n = problem.noise;
   std::vector<std::string> out;
@@ -387,6 +409,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     if (nearest) report.held_out->nearest = ids_of(nearest->chosen);
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }
+  shorten_names(report.plots);
   report.no_model = why_no_model(problem, poor);
   if (!report.no_model.empty()) return report;
   report.model_toml = heat_set_toml(problem, *offer.fit, report.sentence, offer.trust);

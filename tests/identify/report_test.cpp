@@ -227,6 +227,19 @@ TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
             1);
 }
 
+TEST(Report, LogsOfOneNameAreToldApartByTheirFolders) {
+  tests::BenchOptions options;
+  options.seconds = 120;
+  auto logs = tests::bench_logs({options, options, options});
+  logs[0].name = "out/d5/log.csv";
+  logs[1].name = "out/d7/log.csv";
+  logs[2].name = "out/d7/fan.csv";
+  const auto plots = identify::discover(logs, std::nullopt).plots;
+  EXPECT_EQ(plots[0].name, "d5/log.csv");
+  EXPECT_EQ(plots[1].name, "d7/log.csv");
+  EXPECT_EQ(plots[2].name, "fan.csv");
+}
+
 TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   tests::BenchOptions options;
   options.seconds = 120;
