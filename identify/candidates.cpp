@@ -2,6 +2,7 @@
 #include "identify/candidates.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "identify/parallel.hpp"
 
@@ -211,6 +212,24 @@ std::vector<std::string> ids_of(const std::vector<Chosen>& chosen) {
   std::vector<std::string> out;
   for (const Chosen& c : chosen) out.emplace_back(cause_of(c).id);
   std::sort(out.begin(), out.end());
+  return out;
+}
+
+std::vector<std::string> names_of(const std::vector<Chosen>& chosen) {
+  std::vector<std::string> out;
+  bool one_named = false;
+  for (const Chosen& c : chosen) {
+    const Cause& cause = cause_of(c);
+    const bool twice = std::count_if(chosen.begin(), chosen.end(), [&](const Chosen& other) {
+                         return std::string_view(cause_of(other).id) == cause.id;
+                       }) > 1;
+    const char* which = !of_one_log(cause) ? " at a moment" : one_named ? " of another log" : " of one log";
+    out.push_back(std::string(cause.id) + (twice ? which : ""));
+    one_named = one_named || (twice && of_one_log(cause));
+  }
+  std::stable_sort(out.begin(), out.end(), [](const std::string& a, const std::string& b) {
+    return a.substr(0, a.find(' ')) < b.substr(0, b.find(' '));
+  });
   return out;
 }
 

@@ -27,6 +27,8 @@ struct Field {
 };
 
 std::vector<std::string> ids_of(const std::vector<Chosen>& chosen);
+/// The same for a person: of two entries of one id also which each is.
+std::vector<std::string> names_of(const std::vector<Chosen>& chosen);
 
 /// All causes that the logs hold the columns for, those of one log in each; `without`: ids left out.
 std::vector<Chosen> available(const Problem& problem, const std::vector<std::string>& without);

@@ -85,6 +85,14 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   }
 }
 
+/// A set that was found, by its ids.
+std::string in_words(const Search& found, const std::vector<std::string>& ids) {
+  for (const Candidate& c : found.sets) {
+    if ((c.chosen || c.tied) && ids_of(c.fit.chosen) == ids) return listed(names_of(c.fit.chosen), " and ");
+  }
+  return listed(ids, " and ");
+}
+
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   const bool core = !std::isnan(e.core_K);
@@ -97,17 +105,18 @@ std::string sentence(const Search& found, const Report& r) {
     case Verdict::adequate:
       return fmt::format("The two-resistor model is adequate: it {}, no more than the noise explains.", by);
     case Verdict::explained:
-      return fmt::format("The motor behaves like {}: {}.", listed(found.tied.front(), " and "), miss_and_after);
+      return fmt::format("The motor behaves like {}: {}.", in_words(found, found.tied.front()), miss_and_after);
     case Verdict::partly_explained:
       return fmt::format("The motor behaves mostly like {}: {}; a slow disturbance of {:.2f} K remains.",
-                         listed(found.tied.front(), " and "), miss_and_after, found.remains_K);
+                         in_words(found, found.tied.front()), miss_and_after, found.remains_K);
     case Verdict::ambiguous: {
       std::string sets;
       for (std::size_t i = 0; i < std::min<std::size_t>(4, found.tied.size()); ++i)
-        sets += (i > 0 ? ", or " : "") + listed(found.tied[i], " and ");
+        sets += (i > 0 ? ", or " : "") + in_words(found, found.tied[i]);
       std::vector<std::string> shared = found.tied.front();
       for (const auto& ids : found.tied)
         std::erase_if(shared, [&](const auto& id) { return std::find(ids.begin(), ids.end(), id) == ids.end(); });
+      shared.erase(std::unique(shared.begin(), shared.end()), shared.end());
       if (found.tied.size() > 4) sets += fmt::format(", or {} more", found.tied.size() - 4);
       if (!shared.empty()) sets += "; all of them with " + listed(shared, " and ");
       if (found.remains_K > 0) sets += fmt::format("; a slow disturbance of {:.2f} K remains", found.remains_K);
@@ -229,7 +238,7 @@ Offer for_the_board(const Problem& problem, const Search& found, Report& report)
   report.reasoning.push_back(
       fmt::format("The model written for the board is, of those that the log bears out as well, the one that bears a "
                   "push the shortest: {}.",
-                  given.fit->chosen.empty() ? "two resistors" : listed(ids_of(given.fit->chosen), " and ")));
+                  given.fit->chosen.empty() ? "two resistors" : listed(names_of(given.fit->chosen), " and ")));
   return given;
 }
 
@@ -398,7 +407,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     // A heat that no longer depends on the winding, say, leaves R1 open.
     if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, found.chosen.fit);
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
-    if (report.gain) report.gain->like = listed(ids_of(offer.fit->chosen), " and ");
+    if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
   }
   if (poor.empty()) {
     report.experiment = experiment(problem, found, most_A(problem, motor));
@@ -406,7 +415,10 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   }
   if (unseen) {
     report.held_out = score_held_out(*unseen, problem, held, two, nearest ? *nearest : found.chosen.fit, report);
-    if (nearest) report.held_out->nearest = ids_of(nearest->chosen);
+    if (nearest) {
+      report.held_out->nearest = ids_of(nearest->chosen);
+      report.held_out->like = listed(names_of(nearest->chosen), " and ");
+    }
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }
   shorten_names(report.plots);

@@ -56,6 +56,7 @@ struct HeldOut {
   std::string how;
   Rmse before, after;
   std::vector<std::string> nearest;             // where no set explains all: the one that `after` is of
+  std::string like;                             // that set in words
   bool winding = false;                         // the intervals are of the winding's rms; else of the housing's
   int blocks = 0;                               // of a minute
   std::optional<Interval> before_95, after_95;  // bootstrap over blocks, 95 of 100; none when the blocks are too few

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -135,7 +134,7 @@ std::string cause_heading(const std::string& verdict) {
 }
 
 std::string nearest_words(const HeldOut& h) {
-  return fmt::format("by the nearest set, {}, which is no explanation", fmt::join(h.nearest, " and "));
+  return fmt::format("by the nearest set, {}, which is no explanation", h.like);
 }
 
 std::string interval_words(const HeldOut& h) {

@@ -42,7 +42,7 @@ double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen,
   return std::isnan(e.core_K) ? e.housing_K : e.core_K;
 }
 
-std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}", fmt::join(ids_of(chosen), " + ")); }
+std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}", fmt::join(names_of(chosen), " + ")); }
 
 /// A further cause must be worth it where the model may be off by twice what no model follows. Both chosen on gain's
 /// seeds 501 to 508 and 601 to 612: at once that, false second causes of 508 and 607 still passed; with the board's fit

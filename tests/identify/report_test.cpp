@@ -110,6 +110,24 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   EXPECT_GT(scored.before.core_K, 2);
 }
 
+TEST(Report, TwoEntriesOfOneIdAreToldApart) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions draught, fan;
+  for (auto* o : {&draught, &fan}) o->core_every_s = 20;
+  fan.motor.R2 /= 4;
+  for (auto* o : {&draught, &fan}) {
+    const double R2 = o->motor.R2;
+    o->extra_housing_W = [R2](double t, double, double housing) { return t > 400 ? -(housing - 24) / R2 : 0; };
+  }
+  fan.seed = 2;
+  const identify::Report report = identify::discover(tests::bench_logs({draught, fan}), tests::ec_16());
+  EXPECT_EQ(report.tied.front(), (std::vector<std::string>{"cooling_change", "cooling_change"})) << report.sentence;
+  says(report.sentence, "cooling_change at a moment");
+  says(report.sentence, "cooling_change of one log");
+  ASSERT_TRUE(report.gain);
+  says(report.gain->like, "cooling_change at a moment");
+}
+
 TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
   tests::BenchOptions fitted, held_out;
   for (auto* o : {&fitted, &held_out}) o->core_every_s = 20;
