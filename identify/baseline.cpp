@@ -174,15 +174,6 @@ void judge_baseline(const Problem& problem, const Fit& f, const std::vector<Log>
   const double inflation = std::max(1.0, report.structure.residual.ratio);
   report.baseline = base_lines(problem, f, inflation);
   report.core_refusal = core_refusal(problem, f);
-  constexpr double much = 4;  // shipped motors had 1.8 times their sheet's R1; R2 and C2 are the mount's as well
-  const auto compare = [&](const ParameterLine& line, double sheet) {
-    if (problem.belief.known && line.determined && !line.at_bound &&
-        std::abs(std::log(line.value / sheet)) > std::log(much))
-      report.notes.push_back(fmt::format("{} comes out {:.2g} times the sheet's; see whether {} is this motor.",
-                                         line.name, line.value / sheet, problem.belief.motor));
-  };
-  compare(report.baseline[0], problem.belief.R1_K_per_W);
-  compare(report.baseline[2], problem.belief.C1_J_per_K);
   const auto loose = directions(f);
   bool identifiable = true;
   for (const Loose& direction : loose) {
@@ -211,6 +202,18 @@ void judge_baseline(const Problem& problem, const Fit& f, const std::vector<Log>
     report.variants.push_back({"resistance constant", rmse_of(constant, fit(constant, {}, {&f}))});
   }
   add_plots(problem, f, "", report);
+}
+
+void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, Report& report) {
+  constexpr double much = 4;  // shipped motors had 1.8 times their sheet's R1; R2 and C2 are the mount's as well
+  const auto compare = [&](const ParameterLine& line, double sheet) {
+    if (problem.belief.known && line.determined && !line.at_bound &&
+        std::abs(std::log(line.value / sheet)) > std::log(much))
+      report.notes.push_back(fmt::format("{} comes out {:.2g} times the sheet's; see whether {} is this motor.",
+                                         line.name, line.value / sheet, problem.belief.motor));
+  };
+  compare(lines[0], problem.belief.R1_K_per_W);
+  compare(lines[2], problem.belief.C1_J_per_K);
 }
 
 }  // namespace identify

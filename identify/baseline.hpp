@@ -39,6 +39,10 @@ std::string stated_unit(const Problem& problem, const char* unit, Scale scale);
 /// R1, R2, C1 and C2. `inflation`: of the standard errors, where the model leaves more than noise.
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
 
+/// Notes an R1 or a C1 far off the sheet. Two resistors that miss much may exchange their masses: `lines` are of the
+/// model found where one explains.
+void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, Report& report);
+
 /// Why no winding temperature may be stated, empty when it may.
 std::string core_refusal(const Problem& problem, const Fit& fit);
 

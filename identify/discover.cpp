@@ -409,6 +409,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
     if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
   }
+  compare_with_sheet(problem, extended ? report.extended : report.baseline, report);
   if (poor.empty()) {
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);

@@ -402,6 +402,21 @@ TEST(BadInput, TheSheetOfAnotherMotor) {
   refused(spoilt(as_it_is, insulated), "30 times off the sheet");
 }
 
+TEST(Report, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.motor.R1 = 0.69;
+  options.motor.R2 = 11.8;
+  options.core_every_s = 30;
+  options.core_white_K = 2;
+  options.seconds = 1200;
+  options.extra_housing_W = [](double, double, double) { return -0.54; };  // into a colder frame
+  const identify::Report report = report_of(options);
+  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  EXPECT_GT(report.baseline[2].value, 4 * tests::ec_16().motor.C1_J_per_K);
+  for (const std::string& note : report.notes) EXPECT_EQ(note.find("times the sheet's"), std::string::npos) << note;
+}
+
 TEST(BadInput, APauseInWhichTheMotorRanOn) {
   const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
   const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");
