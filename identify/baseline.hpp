@@ -32,8 +32,8 @@ void add_extended(const Problem& problem, const Fit& fit, Report& report, std::s
 /// Standard error to state of a parameter, from that of its fit: no motor is a network of a few nodes.
 double stated_error(double value, double std_error);
 
-/// Unit of a parameter that goes by `scale`: without a sheet the resistance is taken as 1 ohm, and heat comes out divided
-/// by what it is in truth.
+/// Unit of a parameter that goes by `scale`: without a sheet the resistance is taken as 1 ohm, and heat comes out
+/// divided by what it is in truth.
 std::string stated_unit(const Problem& problem, const char* unit, Scale scale);
 
 /// R1, R2, C1 and C2. `inflation`: of the standard errors, where the model leaves more than noise.

@@ -263,12 +263,13 @@ struct Judged {
 
 /// `held_out`: part of the data is, and a cause that spoils the last quarter of the rest is refused.
 Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& logs,
-              const std::optional<wire::pc::MotorFile>& motor, bool held_out) {
+              const std::optional<wire::pc::MotorFile>& motor, bool held_out, const Tell& doing) {
   Judged out;
   auto& [found, poor, vetoed] = out;
   poor = too_poor(problem);
   if (!poor.empty()) return out;
-  found = search(problem);
+  found = search(problem, {}, {}, doing);
+  doing("asking whether the logs can tell, and whether they are read right");
   poor = too_short(problem, base, found);
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
@@ -356,7 +357,8 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
   return out;
 }
 
-Report discover(const std::vector<Log>& given, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held) {
+Report discover(const std::vector<Log>& given, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                const Tell& doing) {
   Report report;
   std::vector<Log> all = given, logs = given;
   all.insert(all.end(), held.logs.begin(), held.logs.end());
@@ -365,17 +367,18 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (held.fraction > 0) {
     for (Log& log : logs) log = without_last(std::move(log), held.fraction);
   }
+  doing("fitting two resistors");
   const Problem problem = problem_of(logs, motor);
   std::optional<Problem> unseen;
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
-  auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value());
+  auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
   if (!given.front().loaded_before && asks_for_load_before(problem, found.chosen.fit)) {
     HoldOut held_too = held;
     for (std::vector<Log>* some : {&(logs = given), &held_too.logs})
       std::transform(some->begin(), some->end(), some->begin(), loaded_before);
-    return discover(logs, motor, held_too);
+    return discover(logs, motor, held_too, doing);
   }
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
@@ -406,15 +409,18 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.extended = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()));
     // A heat that no longer depends on the winding, say, leaves R1 open.
     if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, found.chosen.fit);
+    doing("playing a push on a board");
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
     if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
   }
   compare_with_sheet(problem, extended ? report.extended : report.baseline, report);
   if (poor.empty()) {
+    doing("looking for an experiment");
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);
   }
   if (unseen) {
+    doing("scoring what was held out");
     report.held_out = score_held_out(*unseen, problem, held, two, nearest ? *nearest : found.chosen.fit, report);
     if (nearest) {
       report.held_out->nearest = ids_of(nearest->chosen);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "identify/baseline.hpp"
+#include "identify/doing.hpp"
 
 namespace identify {
 
@@ -10,6 +11,6 @@ namespace identify {
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& fit, std::size_t which);
 
 Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
-                const HoldOut& hold_out = {});
+                const HoldOut& hold_out = {}, const Tell& doing = tell_nobody);
 
 }  // namespace identify

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
+#include "identify/doing.hpp"
 #include "wire/pc/files.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -184,6 +185,8 @@ int answer(Arguments a) {
   for (const std::string& column : a.columns) identify::add_column(said, column);
   for (const auto& [role, source] : said.columns) map.columns[role] = source;
   if (!a.truths.empty()) return score(a, map, motor);
+  std::optional<identify::Doing> doing(std::in_place);
+  (*doing)("reading");
   identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);
   held.draws = a.draws;
   std::vector<Log> logs;
@@ -192,13 +195,15 @@ int answer(Arguments a) {
       throw UserError(Exit::usage, path + ": this log is named twice and would count twice; name it once.");
     for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
   }
-  identify::Report report = identify::discover(logs, motor, held);
+  identify::Report report = identify::discover(logs, motor, held, [&](const std::string& what) { (*doing)(what); });
   if (!map.note.empty()) report.notes.push_back(map.note);
   const bool writes = report.no_model.empty();
   if (writes) report.model_file = a.write_model;
+  (*doing)("writing the answer");
   if (!a.html.empty()) wire::pc::write_whole(a.html, as_html(report));
   if (writes && !a.write_model.empty()) wire::pc::write_whole(a.write_model, report.model_toml);
   if (writes && !a.write_baseline.empty()) wire::pc::write_whole(a.write_baseline, report.baseline_toml);
+  doing.reset();
   if (a.json == "-") {
     show(as_json(report));
   } else {
@@ -254,7 +259,7 @@ int main(int argc, char** argv) {
       "taken before any current. winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
-      "error says why.");
+      "error says why; there, too, stands what is being done once it has lasted two seconds.");
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
     return fmt::format("{}; identify --help lists what there is.\n", error.what());
   });

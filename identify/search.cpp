@@ -384,11 +384,13 @@ const char* word(Verdict v) {
   return "insufficient";
 }
 
-Search search(const Problem& given, const Margins& margins, const std::vector<std::string>& without) {
+Search search(const Problem& given, const Margins& margins, const std::vector<std::string>& without,
+              const Tell& doing) {
   Problem problem = given;
   Search out;
   Field field;
   const auto all = available(problem, without);
+  doing("fitting each cause alone");
   problem.leeway = ordinary_leeway(problem, fit(problem, {}));
   fit_alone_and_settle_noise(problem, all, margins, field, out);
   out.base = out.chosen = field.base;
@@ -398,16 +400,20 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
       fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
   const Disturbance without_causes = disturbance_of(problem, out.base.fit);
   if (ends_without_a_name(problem, field, without_causes, margins, out)) {
+    doing("fitting what a board gets");
     refit_for_the_board(problem, margins, out);
     return out;
   }
 
+  doing("fitting causes in pairs");
   const Problem judged = judged_by_what_remains(problem, all, margins, field, out);
   choose(judged, judged.noise.disturbance_K > problem.noise.disturbance_K, margins, std::move(field), out);
+  doing("looking at what the best leave");
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const double reach = left.complete ? margins.tie : margins.tie + left.gain;
   mark_ties(problem, left, reach, margins, out);
   decide(problem, left, without_causes, reach, margins, out);
+  doing("fitting what a board gets");
   refit_for_the_board(judged, margins, out);
   const std::string beyond = at_a_bound(out.chosen.fit);
   if (!beyond.empty() && names_causes(out.verdict)) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "identify/candidates.hpp"
+#include "identify/doing.hpp"
 
 namespace identify {
 
@@ -79,6 +80,7 @@ struct Search {
 };
 
 /// `without`: ids left out of the table (tests take the truth away and expect "unknown").
-Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {});
+Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {},
+              const Tell& doing = tell_nobody);
 
 }  // namespace identify

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -10,8 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
+#include <thread>
 
 #include "identify/discover.hpp"
+#include "identify/doing.hpp"
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
 #include "identify/parallel.hpp"
@@ -36,9 +39,10 @@ struct Outcome {
   std::string out;
 };
 
+/// Both outputs; `arguments` may send one elsewhere.
 Outcome run(const std::string& arguments) {
   const std::string out = (std::filesystem::temp_directory_path() / "hotcore_identify_out").string();
-  const int status = std::system((std::string(IDENTIFY_PROGRAM) + " " + arguments + " > '" + out + "' 2>&1").c_str());
+  const int status = std::system((std::string(IDENTIFY_PROGRAM) + " > '" + out + "' 2>&1 " + arguments).c_str());
   std::ostringstream text;
   text << std::ifstream(out).rdbuf();
   return {WEXITSTATUS(status), text.str()};
@@ -710,6 +714,38 @@ TEST(Program, WhatAThreadThrowsReachesTheCaller) {
   EXPECT_THROW(identify::in_parallel(100, [](std::size_t) { throw std::runtime_error("part"); }), std::runtime_error);
 }
 
+TEST(Program, WhatIsBeingDoneIsSaidOnceItLasts) {
+  const auto said = [](std::chrono::milliseconds silent, bool terminal) {
+    testing::internal::CaptureStderr();
+    {
+      identify::Doing doing(silent, terminal);
+      for (int i = 0; i < 3; ++i) {
+        doing("fitting");
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
+    }
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(said(std::chrono::seconds(100), false), "");
+  EXPECT_EQ(said(std::chrono::seconds(100), true), "");
+  EXPECT_EQ(said(std::chrono::milliseconds(1), false), "identify: fitting\n") << "once, as it goes into a file";
+  const std::string in_place = said(std::chrono::milliseconds(1), true);
+  says(in_place, "\r\033[K  fitting, 0 s");
+  EXPECT_TRUE(in_place.ends_with("\r\033[K")) << "and leaves the line to the answer";
+}
+
+TEST(Program, EachPartOfTheWorkIsTold) {
+  tests::BenchOptions options;
+  options.seconds = 300;
+  identify::HoldOut held;
+  held.fraction = 0.25;
+  std::string told;
+  (void)identify::discover(tests::bench_logs({options}), tests::ec_16(), held,
+                           [&](const std::string& what) { told += what + "; "; });
+  EXPECT_EQ(told.find("fitting two resistors; fitting each cause alone; "), 0u) << told;
+  says(told, "scoring what was held out; ");
+}
+
 TEST(Program, AWrongOptionIsUsage) {
   EXPECT_EQ(run("--nonsense").code, 2);
   EXPECT_EQ(run("").code, 2);
@@ -762,7 +798,7 @@ TEST(Program, ALogWithoutLoadCannotBeUsed) {
 TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const Outcome r = run(data + "tass_run1.csv " + data + "tass_run3.csv --hold-out " + data +
-                        "tass_run4_fan.csv --map " + maps + "tass.toml --json -");
+                        "tass_run4_fan.csv --map " + maps + "tass.toml --json - 2> /dev/null");
   ASSERT_EQ(r.code, 0) << r.out;
   const json j = json::parse(r.out);
   EXPECT_GT(j["held_out"]["rmse_before_K"]["core"], 20);
@@ -784,7 +820,7 @@ TEST(MeasuredData, AFanMakesNoSessionTooShort) {
 }
 
 json answer(const std::string& arguments) {
-  const Outcome r = run(arguments + " --json -");
+  const Outcome r = run(arguments + " --json - 2> /dev/null");
   EXPECT_EQ(r.code, 0) << r.out;
   return json::parse(r.out);
 }
