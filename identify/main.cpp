@@ -14,6 +14,7 @@
 #include "identify/discover.hpp"
 #include "identify/doing.hpp"
 #include "wire/pc/files.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
@@ -29,6 +30,9 @@ Examples
   identify run1.csv run3.csv --hold-out fan.csv           fit two logs, score on a third
   identify bench.csv --map identify/maps/paderborn.toml --html report.html
   identify bench.csv --column housing_degC=T_case:degF --json -
+  identify walk.csv --motor ec-16-40w --explain           how the answer was found as well
+  identify walk.csv --motor ec-16-40w --write-model model.toml     what a board should run
+  identify a.csv b.csv --score a.json b.json              how often right, where truths are known
 )";
 
 struct Arguments {
@@ -64,10 +68,12 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   identify::HoldOut out;
   if (what.empty()) return out;
   char* end = nullptr;
-  const double fraction = std::strtod(what.c_str(), &end);
-  if (*end == '\0') {
+  double fraction = std::strtod(what.c_str(), &end);
+  const bool percent = std::string_view(end) == "%";
+  if (percent) fraction /= 100;
+  if (percent || *end == '\0') {
     if (!(fraction > 0 && fraction < 0.9))
-      throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9.");
+      throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9, or 0% and 90%.");
     out.fraction = fraction;
     return out;
   }
@@ -219,33 +225,44 @@ int answer(Arguments a) {
 
 int main(int argc, char** argv) {
   CLI::App app{examples};
+  app.formatter(std::make_shared<wire::pc::Help>());
   Arguments a;
   app.add_option("LOG", a.logs, "CSV logs of one motor, fitted together")->required();
   app.add_option(
-      "--motor", a.motor,
-      "motor file (.toml), or the name of one in boards/motors (or in the folder that HOTCORE_MOTORS names); "
-      "without it the answer is less certain");
-  app.add_option("--map", a.map, "TOML file that says which column is what");
+         "--motor", a.motor,
+         "motor file (.toml), or the name of one in boards/motors (or in the folder that HOTCORE_MOTORS names); "
+         "without it the answer is less certain")
+      ->type_name("MOTOR");
+  app.add_option("--map", a.map, "TOML file that says which column is what")->type_name("FILE");
   app.add_option("--column", a.columns,
                  "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated; see below)")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->type_name("ROLE=NAME");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,
-                 "a log, or the last part of each log as a fraction (0.25), that is scored and not fitted");
+                 "a log, or the last part of each log as a fraction (0.25 or 25%), that is scored and not fitted")
+      ->type_name("WHAT");
   app.add_option("--bootstrap", a.draws,
-                 "how often the held-out error is redrawn for its interval; below 100: no interval")
+                 "with --hold-out: how often the held-out error is redrawn for its interval, 100000 times at most; "
+                 "below 100: no interval")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000))
-      ->needs("--hold-out");
-  app.add_option("--json", a.json, "write the answer as JSON; - for standard output, and nothing else there");
-  app.add_option("--html", a.html, "write a page with pictures");
+      ->needs("--hold-out")
+      ->type_name("N");
+  app.add_option("--json", a.json, "write the answer as JSON; - for standard output, and nothing else there")
+      ->type_name("FILE");
+  app.add_option("--html", a.html, "write a page with pictures")->type_name("FILE");
   app.add_option("--write-model", a.write_model,
-                 "write the model found as a heat-network parameter set (TOML) that the board runs");
+                 "write the model found as a heat-network parameter set (TOML) that the board runs")
+      ->type_name("FILE");
   app.add_option("--write-baseline", a.write_baseline,
-                 "the same of the two-resistor model as fitted, to compare on the board with what was found");
+                 "the same of the two-resistor model as fitted, to compare on the board with what was found")
+      ->type_name("FILE");
   auto* score = app.add_option("--score", a.truths,
                                "truth files, one a log in the same order: answer each log by itself and print how "
-                               "often that was right, and what was taken for what");
+                               "often that was right, and what was taken for what; goes with no option that writes or "
+                               "holds out")
+                    ->type_name("FILE ...");
   for (const char* other : {"--hold-out", "--json", "--html", "--write-model", "--write-baseline", "--explain"})
     score->excludes(other);
   app.footer(
@@ -260,8 +277,9 @@ int main(int argc, char** argv) {
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
       "error says why; there, too, stands what is being done once it has lasted two seconds.");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) {
-    return fmt::format("{}; identify --help lists what there is.\n", error.what());
+  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
+    const std::string hint = wire::pc::nearest_option(*of);
+    return fmt::format("{}{} identify --help lists what there is.\n", error.what(), hint.empty() ? ";" : hint);
   });
   try {
     app.parse(argc, argv);

@@ -19,6 +19,7 @@
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
 #include "wire/pc/files.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -34,11 +35,10 @@ constexpr const char* examples =
     "  host-sim run jump                         the scene, its log and its picture below ./out/jump\n"
     "  host-sim run stall --set shaft.angle_rad=0.5 --set seed=7\n"
     "  host-sim run jump --set trust=sheet       what not knowing the motor costs\n"
-    "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008, as text and "
-    "pictures\n"
+    "  host-sim figures                          Figs 1, 2, 6 and the tables of Urata et al. 2008\n"
     "  host-sim record duty --hide seed=7        a 20 min log of a motor that is not what its sheet says\n"
-    "  host-sim run get-up --hide seed=7 --set trust=identified --set model=model.toml   what identify's model gains\n"
-    "  host-sim record profile --profile answer.json --hide seed=7   the experiment that identify advised for it\n"
+    "  host-sim run get-up --hide seed=7 --set trust=identified --set model=model.toml   identify's model\n"
+    "  host-sim record profile --profile answer.json --hide seed=7   what identify advised for it\n"
     "  host-sim list                             scenes and motors\n"
     "Exit codes: 0 done, 2 the command line or a file is wrong.\n";
 
@@ -154,6 +154,11 @@ int main(int argc, char** argv) {
   feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
 #endif
   CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples), "host-sim"};
+  app.formatter(std::make_shared<wire::pc::Help>());
+  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
+    const std::string hint = wire::pc::nearest_option(*of);
+    return fmt::format("{}{} --help lists what there is.\n", error.what(), hint.empty() ? ";" : hint);
+  });
   app.require_subcommand(1);
   std::string scene, hide, out = "out";
   std::vector<std::string> overrides;
@@ -162,37 +167,55 @@ int main(int argc, char** argv) {
   CLI::App* run_command = app.add_subcommand("run", "play a scene");
   run_command->add_option("scene", scene, "a name (see list) or a .toml file")->required();
   run_command->add_option("--set", overrides, "key=value of the scene, e.g. seconds=5 or shaft.angle_rad=0.5")
-      ->take_all();
-  run_command->add_option("--hide", hide,
-                          "seed=N: the motor that record --hide seed=N records; the firmware believes its sheet");
-  run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str();
+      ->take_all()
+      ->type_name("KEY=VALUE");
+  run_command
+      ->add_option("--hide", hide, "the motor that record --hide seed=N records; the firmware believes its sheet")
+      ->type_name("seed=N");
+  run_command->add_option("--out", out, "folder for logs and picture")->capture_default_str()->type_name("FOLDER");
   run_command->add_flag("--json", json, "the summary as JSON on standard output");
 
   CLI::App* list_command = app.add_subcommand("list", "scenes and motors");
   list_command->add_flag("--json", json, "as JSON on standard output");
 
   CLI::App* figures_command = app.add_subcommand("figures", "the paper's figures and tables, computed anew");
-  figures_command->add_option("--out", out, "folder for the pictures")->capture_default_str();
+  figures_command->add_option("--out", out, "folder for the pictures")->capture_default_str()->type_name("FOLDER");
   figures_command->add_flag("--json", json, "the numbers as JSON on standard output");
 
   RecordOptions recording{.motor_folder = motor_folder, .scene_folder = scene_folder};
   CLI::App* record_command = app.add_subcommand("record", "record a log, with an effect hidden in the motor if wanted");
   record_command->add_option("excitation", recording.excitation, "duty, designed, step, profile, or a scene")
       ->required();
-  record_command->add_option("--profile", recording.profile, "identify's answer (--json) whose experiment is played");
-  record_command->add_option("--motor", recording.motor, "a name (see list) or a .toml file")->capture_default_str();
-  record_command->add_option("--minutes", recording.minutes, "length of the log")
+  record_command->add_option("--profile", recording.profile, "identify's answer (--json) whose experiment is played")
+      ->type_name("FILE");
+  record_command->add_option("--motor", recording.motor, "a name (see list) or a .toml file")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 1440.0));
-  record_command->add_option("--seed", recording.seed, "of excitation and noise")->capture_default_str();
-  record_command->add_option(
-      "--hide", hide,
-      "seed=N: hide an effect drawn from seed N, and take the motor off its sheet. Never drawn, since "
-      "they cannot show on a bench with one motor and one clock: current_offset (learnt at rest), "
-      "neighbour_heat, frame_conduction, clock_delay");
+      ->type_name("MOTOR");
+  record_command->add_option("--minutes", recording.minutes, "length of the log, 0.1 to 1440")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1440.0))
+      ->type_name("MINUTES");
+  record_command->add_option("--seed", recording.seed, "of excitation and noise")
+      ->capture_default_str()
+      ->type_name("N");
+  record_command
+      ->add_option("--hide", hide,
+                   "hide an effect drawn from seed N, and take the motor off its sheet. Never drawn, since they cannot "
+                   "show on a bench with one motor and one clock: current_offset (learnt at rest), neighbour_heat, "
+                   "frame_conduction, clock_delay")
+      ->type_name("seed=N");
   record_command->add_flag("--thermocouple", recording.thermocouple, "a winding temperature in every line");
-  record_command->add_option("--out", out, "folder for log.csv and truth.json")->capture_default_str();
+  record_command->add_option("--out", out, "folder for log.csv and truth.json")
+      ->capture_default_str()
+      ->type_name("FOLDER");
   record_command->add_flag("--json", json, "what was recorded as JSON on standard output");
+
+  record_command->footer(
+      "Examples:\n"
+      "  host-sim record duty                                    20 min as a robot's axis would have it\n"
+      "  host-sim record duty --hide seed=7 --out out/7          of a motor that is not what its sheet says\n"
+      "  host-sim record designed --hide seed=7 --thermocouple   a course that tells more, winding read always\n"
+      "  host-sim record profile --profile answer.json --hide seed=7   what identify advised");
 
   try {
     app.parse(argc, argv);

@@ -2,6 +2,7 @@
 #include "boards/host/record.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "boards/host/run_scene.hpp"
 #include "host-sim/plant/hidden_causes.hpp"
 #include "wire/pc/motor_file.hpp"
+#include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace boards::host {
@@ -40,10 +42,19 @@ bool shows_on_a_bench(const std::string& id) {
 /// The scene that is recorded, without its program: a named one, or an empty one for a made excitation.
 Scene scene_of(const RecordOptions& options) {
   Scene scene;
-  if (options.excitation == "duty" || options.excitation == "designed" || options.excitation == "step" ||
-      options.excitation == "profile") {
+  std::vector<std::string> known = {"duty", "designed", "step", "profile"};
+  if (std::find(known.begin(), known.end(), options.excitation) != known.end()) {
     scene.motor = options.motor;
     return scene;
+  }
+  const std::vector<std::string> scenes = scene_names(options.scene_folder);
+  known.insert(known.end(), scenes.begin(), scenes.end());
+  const bool file = options.excitation.ends_with(".toml");
+  if (!file && std::find(scenes.begin(), scenes.end(), options.excitation) == scenes.end()) {
+    const std::string hint = wire::pc::did_you_mean(options.excitation, known);
+    throw wire::pc::UserError(wire::pc::Exit::usage,
+                              fmt::format("There is nothing called '{}' to record{} There are: {}.", options.excitation,
+                                          hint.empty() ? "." : hint, fmt::join(known, ", ")));
   }
   scene = read_scene(options.excitation, options.scene_folder, {});
   if (scene.shaft.kind == Shaft::Kind::free) {

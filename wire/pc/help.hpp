@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// How the PC programs show their options: in a hundred columns, what an option takes and its default, and no more.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "wire/pc/names.hpp"
+
+namespace wire::pc {
+
+class Help : public CLI::Formatter {
+ public:
+  static constexpr std::size_t columns = 100;
+
+  std::string make_option_opts(const CLI::Option* option) const override {
+    if (option->get_positional()) return option->get_expected_max() > 1 ? " ..." : "";
+    if (option->get_type_size() == 0) return "";
+    const std::string type = option->get_type_name();  // followed by what checks it
+    const std::string standard = option->get_default_str();
+    return " " + type.substr(0, type.find(':')) + (standard.empty() ? "" : " (" + standard + ")");
+  }
+  std::string make_option_desc(const CLI::Option* option) const override {
+    return wrapped(option->get_description(), columns - get_column_width());
+  }
+  std::string make_footer(const CLI::App* app) const override {
+    const std::string text = app->get_footer();
+    return text.empty() ? "" : wrapped(text, columns) + "\n";
+  }
+
+ private:
+  static std::string wrapped(const std::string& text, std::size_t width) {
+    std::string out;
+    std::size_t line = 0, gap = 0;  // where the line begins; its last gap, 0: none
+    for (const char c : text) {
+      if (c == '\n') line = out.size() + 1, gap = 0;
+      if (c == ' ') gap = out.size();
+      out += c;
+      if (out.size() - line > width && gap > line) {
+        out[gap] = '\n';
+        line = gap + 1;
+        gap = 0;
+      }
+    }
+    return out;
+  }
+};
+
+/// Of a mistake on the command line: ", did you mean --motor?" where an option is nearly one that there is, or nothing.
+inline std::string nearest_option(const CLI::App& app) {
+  std::vector<std::string> known;
+  const auto add = [&](const CLI::App& of) {
+    for (const CLI::Option* option : of.get_options())
+      known.insert(known.end(), option->get_lnames().begin(), option->get_lnames().end());
+  };
+  add(app);
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App* c) { return c->parsed(); })) add(*command);
+  for (const std::string& word : app.remaining(true)) {
+    if (word.rfind("--", 0) != 0) continue;
+    const std::string name = nearest(word.substr(2, word.find('=') - 2), known);
+    if (!name.empty()) return ", did you mean --" + name + "?";
+  }
+  return "";
+}
+
+}  // namespace wire::pc
