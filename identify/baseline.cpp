@@ -158,8 +158,15 @@ void judge_baseline(const Problem& problem, const Fit& f, const std::vector<Log>
                     const std::optional<wire::pc::MotorFile>& motor, Report& report) {
   report.motor = problem.belief.known ? problem.belief.motor : "unknown";
   for (const Bins& log : problem.logs) {
-    for (const std::string& note : log.notes)
-      report.notes.push_back(problem.logs.size() > 1 ? log.name + ": " + note : note);
+    for (const std::string& note : log.notes) {
+      const bool of_all = std::all_of(problem.logs.begin(), problem.logs.end(), [&](const Bins& other) {
+        return std::find(other.notes.begin(), other.notes.end(), note) != other.notes.end();
+      });
+      if (!of_all)
+        report.notes.push_back(log.name + ": " + note);
+      else if (&log == &problem.logs.front())
+        report.notes.push_back(note);
+    }
   }
   if (!problem.belief.known) {
     report.notes.push_back(

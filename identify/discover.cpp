@@ -37,7 +37,8 @@ std::vector<Rung> ladder_of(const Search& found) {
     const bool tied =
         found.verdict == Verdict::ambiguous &&
         std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
-    out.push_back({id, cause_of(c.fit.chosen.front()).name, c.gain, chosen, tied && !chosen});
+    const double shown = std::abs(c.gain) < 0.05 ? 0 : c.gain;  // what rounds to nothing has no sign
+    out.push_back({id, cause_of(c.fit.chosen.front()).name, shown, chosen, tied && !chosen});
   }
   return out;
 }
@@ -96,11 +97,18 @@ std::string in_words(const Search& found, const std::vector<std::string>& ids) {
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   const bool core = !std::isnan(e.core_K);
-  const std::string by =
-      fmt::format("misses the {} by {:.2f} K rms", core ? "winding" : "housing", core ? e.core_K : e.housing_K);
+  const Noise& n = found.noise;
+  const double noise_K =
+      core ? std::hypot(n.core_white_K, n.core_slow_K) : std::hypot(n.housing_white_K, n.housing_slow_K);
+  const double after_K = core ? r.extended_rmse.core_K : r.extended_rmse.housing_K;
+  // A model that is wrong shows more noise than there is.
+  const bool right = found.verdict == Verdict::adequate || names_causes(found.verdict);
+  const bool counts = right && noise_K > 0.3 * after_K;  // in what is missed
+  const std::string by = fmt::format("misses the {}{} by {:.2f} K rms", core ? "winding" : "housing",
+                                     counts ? fmt::format(", whose readings are noisy by {:.1f} K,", noise_K) : "",
+                                     core ? e.core_K : e.housing_K);
   const std::string miss = "the two-resistor model " + by;
-  const std::string miss_and_after =
-      fmt::format("{}, the extended one by {:.2f} K", miss, core ? r.extended_rmse.core_K : r.extended_rmse.housing_K);
+  const std::string miss_and_after = fmt::format("{}, the extended one by {:.2f} K", miss, after_K);
   switch (found.verdict) {
     case Verdict::adequate:
       return fmt::format("The two-resistor model is adequate: it {}, no more than the noise explains.", by);

@@ -125,8 +125,9 @@ void record_log(RecordOptions options, const std::string& out, bool json) {
     fmt::print("{{\"log\": \"{}\", \"truth\": \"{}\", \"hottest_core_degC\": {:.1f}, \"winding_max_degC\": {:g}}}\n",
                log, truth, recording.hottest_true_degC, recording.winding_max_degC);
   } else {
-    fmt::print("Recorded (simulated): {}; the hottest winding was {:.1f} degC of {:g} allowed. What is hidden: {}\n",
-               log, recording.hottest_true_degC, recording.winding_max_degC, truth);
+    fmt::print("Recorded (simulated): {}; the hottest winding was {:.1f} degC of {:g} allowed.{}\n", log,
+               recording.hottest_true_degC, recording.winding_max_degC,
+               options.hide ? " What is hidden: " + truth : "");
   }
 }
 

@@ -155,14 +155,17 @@ HiddenMotor hidden_motor(std::uint64_t seed, const std::string& motor, const std
   const host_sim::DrawnEffect drawn = host_sim::draw_effect(
       cause, design, demands, program_Hz, host_sim::full_speed_rad_per_s(sheet, supply_V), target_K, random.next());
   truth.hidden = drawn.hidden;
-  const nlohmann::ordered_json json = {
-      {"format", 1},
-      {"causes", {{{"id", cause.id}, {"amount", drawn.amount}, {"error_before_refit_K", drawn.error_K}}}},
-      {"motor",
-       {{"R1_K_per_W", truth.motor.R1_K_per_W},
-        {"R2_K_per_W", truth.motor.R2_K_per_W},
-        {"C1_J_per_K", truth.motor.C1_J_per_K},
-        {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
+  const nlohmann::ordered_json json = {{"format", 1},
+                                       {"causes",
+                                        {{{"id", cause.id},
+                                          {"amount", drawn.amount},
+                                          {"unit", "typical sizes"},
+                                          {"error_before_refit_K", drawn.error_K}}}},
+                                       {"motor",
+                                        {{"R1_K_per_W", truth.motor.R1_K_per_W},
+                                         {"R2_K_per_W", truth.motor.R2_K_per_W},
+                                         {"C1_J_per_K", truth.motor.C1_J_per_K},
+                                         {"C2_J_per_K", truth.motor.C2_J_per_K}}}};
   truth.truth_json = json.dump(2) + "\n";
   return truth;
 }

@@ -20,6 +20,7 @@ RecordOptions options_of(const std::string& excitation, std::uint64_t seed, std:
 TEST(Record, AHiddenMotorIsTheSameWhateverIsRecordedOfIt) {
   const auto duty = record(options_of("duty", 1, 7)), designed = record(options_of("designed", 2, 7));
   EXPECT_EQ(duty.truth_json, designed.truth_json);
+  EXPECT_NE(duty.truth_json.find("\"unit\": \"typical sizes\""), std::string::npos) << duty.truth_json;
   EXPECT_NE(duty.log_csv, designed.log_csv);
   EXPECT_NE(duty.truth_json, record(options_of("duty", 1, 8)).truth_json);
 }

@@ -262,6 +262,19 @@ TEST(Report, LogsOfOneNameAreToldApartByTheirFolders) {
   EXPECT_EQ(plots[2].name, "fan.csv");
 }
 
+TEST(Report, WhatIsSoOfEveryLogIsSaidOnce) {
+  tests::BenchOptions options;
+  options.seconds = 120;
+  auto logs = tests::bench_logs({options, options});
+  logs[1].name = "the other";
+  for (auto& log : logs) log.notes = {"bus_V is not used."};
+  logs[1].notes.push_back("A hole.");
+  const auto notes = identify::discover(logs, std::nullopt).notes;
+  EXPECT_EQ(std::count(notes.begin(), notes.end(), "bus_V is not used."), 1);
+  EXPECT_EQ(std::count(notes.begin(), notes.end(), "the other: A hole."), 1);
+  EXPECT_EQ(std::count(notes.begin(), notes.end(), "the other: bus_V is not used."), 0);
+}
+
 TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   tests::BenchOptions options;
   options.seconds = 120;
@@ -418,6 +431,8 @@ TEST(Report, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
   const identify::Report report = report_of(options);
   ASSERT_EQ(report.verdict, "explained") << report.sentence;
   EXPECT_GT(report.baseline[2].value, 4 * tests::ec_16().motor.C1_J_per_K);
+  says(report.sentence, "misses the winding, whose readings are noisy by 1.");
+  EXPECT_EQ(identify::as_text(report, false).find("-0.0 "), std::string::npos) << "in the ladder";
   for (const std::string& note : report.notes) EXPECT_EQ(note.find("times the sheet's"), std::string::npos) << note;
 }
 

@@ -113,6 +113,10 @@ refuse(profile_without_advice 2 "no experiment in it" ${HOST_SIM} record profile
 refuse(no_board_at_all 2 "1 to 1000 boards" ${BIN}/many_boards none)
 refuse(free_shaft_repeated 2 "free shaft" ${HOST_SIM} record jump)
 
+execute_process(COMMAND ${HOST_SIM} record step --minutes 0.1 --out ${SCRATCH}/plain OUTPUT_VARIABLE said)
+if(said MATCHES "hidden" OR NOT said MATCHES "Recorded")
+  list(APPEND failures "a log with nothing hidden: ${said}")
+endif()
 foreach(command "${IDENTIFY}" "${HOST_SIM}" "${HOST_SIM};run" "${HOST_SIM};record")
   execute_process(COMMAND ${command} --help OUTPUT_VARIABLE help)
   string(REGEX MATCH "TEXT|UINT|FLOAT|INT:|Excludes|Needs:" noise "${help}")
