@@ -630,6 +630,27 @@ TEST(Report, ThePageIsOneFileAndEscapesWhatItShows) {
   EXPECT_EQ(html.find("<link"), std::string::npos);
 }
 
+TEST(Report, APictureNamesWhatItShows) {
+  identify::Report report;
+  identify::LogPlot plot;
+  for (auto* of :
+       {&plot.time_s, &plot.heat, &plot.measured_housing, &plot.simulated_housing, &plot.measured_core,
+        &plot.simulated_core, &plot.extended_housing, &plot.extended_core, &plot.residual_housing, &plot.residual_core})
+    *of = {1, 2, 3};
+  report.plots = {plot};
+  const auto shown = [&](const std::string& part) {
+    const std::string html = identify::as_html(report);
+    int count = 0;
+    for (std::size_t at = html.find(part); at != std::string::npos; at = html.find(part, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(shown("tinted"), 0);
+  EXPECT_EQ(shown("<text>housing, extended<"), 2) << "temperature and residual";
+  EXPECT_EQ(shown("<text>winding, two resistors<"), 2) << "longer labels leave the curves less room";
+  report.structure.wrong = {{0, "winding", 1, 2, 1.5, "current"}};
+  EXPECT_EQ(shown("tinted"), 1);
+}
+
 identify::Report foretold(std::uint64_t seed) {
   identify::HoldOut held;
   held.fraction = 0.25;
