@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What is being done, said on standard error once it has lasted two seconds: in place on a terminal, else a line for
-// each thing.
+// What is being done, said in place on a terminal once it has lasted two seconds; nowhere else, where one sentence on
+// standard error means an error.
 #pragma once
 
 #include <unistd.h>
@@ -24,7 +24,9 @@ class Doing {
   using Clock = std::chrono::steady_clock;
 
   explicit Doing(Clock::duration silent = std::chrono::seconds(2), bool terminal = isatty(STDERR_FILENO) != 0)
-      : terminal_(terminal), thread_([this, silent] { say_from(silent); }) {}
+      : thread_([this, silent, terminal] {
+          if (terminal) say_from(silent);
+        }) {}
   Doing(const Doing&) = delete;
   ~Doing() {
     {
@@ -51,20 +53,15 @@ class Doing {
     std::string said;
     const auto news = [&] { return ended_ || what_ != said; };
     while (!ended_) {
-      if (terminal_) {
-        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - start).count();
-        std::fprintf(stderr, "\r\033[K  %s, %ld s", what_.c_str(), static_cast<long>(seconds));
-      } else if (what_ != said) {
-        std::fprintf(stderr, "identify: %s\n", what_.c_str());
-      }
+      const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - start).count();
+      std::fprintf(stderr, "\r\033[K  %s, %ld s", what_.c_str(), static_cast<long>(seconds));
       std::fflush(stderr);
       said = what_;
       changed_.wait_for(lock, std::chrono::seconds(1), news);
     }
-    if (terminal_ && !said.empty()) std::fputs("\r\033[K", stderr);
+    if (!said.empty()) std::fputs("\r\033[K", stderr);
   }
 
-  const bool terminal_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::string what_;

@@ -276,7 +276,7 @@ int main(int argc, char** argv) {
       "taken before any current. winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
-      "error says why; there, too, stands what is being done once it has lasted two seconds.");
+      "error says why.");
   app.failure_message([](const CLI::App* of, const CLI::Error& error) {
     const std::string hint = wire::pc::nearest_option(*of);
     return fmt::format("{}{} identify --help lists what there is.\n", error.what(), hint.empty() ? ";" : hint);

@@ -39,10 +39,9 @@ struct Outcome {
   std::string out;
 };
 
-/// Both outputs; `arguments` may send one elsewhere.
 Outcome run(const std::string& arguments) {
   const std::string out = (std::filesystem::temp_directory_path() / "hotcore_identify_out").string();
-  const int status = std::system((std::string(IDENTIFY_PROGRAM) + " > '" + out + "' 2>&1 " + arguments).c_str());
+  const int status = std::system((std::string(IDENTIFY_PROGRAM) + " " + arguments + " > '" + out + "' 2>&1").c_str());
   std::ostringstream text;
   text << std::ifstream(out).rdbuf();
   return {WEXITSTATUS(status), text.str()};
@@ -762,11 +761,10 @@ TEST(Program, WhatIsBeingDoneIsSaidOnceItLasts) {
     }
     return testing::internal::GetCapturedStderr();
   };
-  EXPECT_EQ(said(std::chrono::seconds(100), false), "");
   EXPECT_EQ(said(std::chrono::seconds(100), true), "");
-  EXPECT_EQ(said(std::chrono::milliseconds(1), false), "identify: fitting\n") << "once, as it goes into a file";
+  EXPECT_EQ(said(std::chrono::milliseconds(1), false), "") << "into a file";
   const std::string in_place = said(std::chrono::milliseconds(1), true);
-  says(in_place, "\r\033[K  fitting, 0 s");
+  says(in_place, "\r\033[K  fitting, ");
   EXPECT_TRUE(in_place.ends_with("\r\033[K")) << "and leaves the line to the answer";
 }
 
@@ -834,7 +832,7 @@ TEST(Program, ALogWithoutLoadCannotBeUsed) {
 TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const Outcome r = run(data + "tass_run1.csv " + data + "tass_run3.csv --hold-out " + data +
-                        "tass_run4_fan.csv --map " + maps + "tass.toml --json - 2> /dev/null");
+                        "tass_run4_fan.csv --map " + maps + "tass.toml --json -");
   ASSERT_EQ(r.code, 0) << r.out;
   const json j = json::parse(r.out);
   EXPECT_GT(j["held_out"]["rmse_before_K"]["core"], 20);
@@ -856,7 +854,7 @@ TEST(MeasuredData, AFanMakesNoSessionTooShort) {
 }
 
 json answer(const std::string& arguments) {
-  const Outcome r = run(arguments + " --json - 2> /dev/null");
+  const Outcome r = run(arguments + " --json -");
   EXPECT_EQ(r.code, 0) << r.out;
   return json::parse(r.out);
 }
