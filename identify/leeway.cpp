@@ -10,9 +10,11 @@ namespace {
 /// Chosen on clean logs of host-sim's default motor, whose housing is of several parts (seeds from 930), and small
 /// enough that lags and delays of a few seconds keep their names (seeds 800, 801).
 constexpr double ordinary_late_s = 0.5, ordinary_late_share = 0.002;
+/// When in its row's interval a dense winding was read: anywhere in it, this standard deviation.
+const double ordinary_moment_share = 1 / std::sqrt(12.0);
 /// A row's current may flow until the next row, have flowed since the row before, or anything between: the winding read
 /// beside it is up to an interval ahead of it, evenly likely, the root of whose mean square this is.
-const double ordinary_moment_share = 1 / std::sqrt(3.0);
+const double ordinary_ahead_share = 1 / std::sqrt(3.0);
 /// Phases may share all of their heat or none (problem.cpp): of what was assumed, in the middle, this standard
 /// deviation.
 const double ordinary_uneven_share = 1 / std::sqrt(3.0);
@@ -47,14 +49,14 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   const Fit two_resistors = bare(motor);
   const Physical p = physical(two_resistors.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  constexpr double lag_s = 0.2;  // short: it shows the slope
+  constexpr double lag_s = 0.2, delay_s = 0.01;  // short: they show the slope
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
   });
   const Fit& prompt = sensor ? two_resistors : motor;
-  const Fit late = with_cause(prompt, "sensor_lag", {lag_s});
+  const Fit late = with_cause(prompt, "sensor_lag", {lag_s}), delayed = with_cause(prompt, "clock_delay", {delay_s});
   Fit framed = with_cause(two_resistors, "third_mass",
                           {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
                            std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
@@ -68,19 +70,23 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     for (Bin& bin : log.bins)
       bin.input[thermal::Drive::current_A2] += ordinary_ripple_share * log.current_noise_A * log.current_noise_A;
   }
-  Leeway lateness, frame, phases, moment, ripple;
+  Leeway lateness, frame, phases, moment, ahead, ripple;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
                    held = replayed(problem, framed, l), even = replayed(problem, motor, l),
                    warmed = replayed(uneven, motor, l), heated = replayed(rippling, motor, l);
     const Replayed& at_once = sensor ? plain : even;
-    // By half of it, since at its ends another load may begin, which then would count for all or for nothing.
-    const Replayed ahead = replayed(problem, with_cause(prompt, "clock_delay", {-problem.logs[l].interval_s / 2}), l);
+    const double row_s = problem.logs[l].interval_s;
+    // Another load begins with a row: what is read ahead of it goes by the one, what is read late by the other.
+    const Replayed after = replayed(problem, delayed, l),
+                   before = replayed(problem, with_cause(prompt, "clock_delay", {-row_s / 2}), l);
     lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.core_K.push_back(apart_K(ahead.core_degC, at_once.core_degC, 2 * ordinary_moment_share));
+    ahead.housing_K.emplace_back(plain.core_degC.size(), 0.0);
+    moment.core_K.push_back(apart_K(after.core_degC, at_once.core_degC, ordinary_moment_share * row_s / delay_s));
+    ahead.core_K.push_back(apart_K(before.core_degC, at_once.core_degC, 2 * ordinary_ahead_share));
     frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
     frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
     phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
@@ -90,7 +96,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   }
   std::vector<Leeway> out = {lateness, frame};
   if (problem.uneven_per_A2 > 0) out.push_back(phases);
-  if (problem.noise.core_slow_K > 0) out.push_back(moment);
+  if (problem.noise.core_slow_K > 0) out.insert(out.end(), {ahead, moment});
   if (ripples && !problem.heated_by_power()) out.push_back(ripple);
   return out;
 }

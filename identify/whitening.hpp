@@ -54,7 +54,7 @@ struct Whitener {
 /// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
 /// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
 struct Averaged {
-  static constexpr std::size_t most = 5;
+  static constexpr std::size_t most = 6;
   std::vector<Leeway> effects;  // whitened
   Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
   double log_determinant = 0;
