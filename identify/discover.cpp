@@ -103,7 +103,7 @@ std::string sentence(const Search& found, const Report& r) {
   const double after_K = core ? r.extended_rmse.core_K : r.extended_rmse.housing_K;
   // A model that is wrong shows more noise than there is.
   const bool right = found.verdict == Verdict::adequate || names_causes(found.verdict);
-  const bool counts = right && noise_K > 0.3 * after_K;  // in what is missed
+  const bool counts = right && noise_K > 0.3 * after_K;  // a tenth of the squares that are missed, and more
   const std::string by = fmt::format("misses the {}{} by {:.2f} K rms", core ? "winding" : "housing",
                                      counts ? fmt::format(", whose readings are noisy by {:.1f} K,", noise_K) : "",
                                      core ? e.core_K : e.housing_K);
@@ -250,19 +250,15 @@ Offer for_the_board(const Problem& problem, const Search& found, Report& report)
   return given;
 }
 
-/// The search, and what speaks against answering by it.
-/// Is what a log needs a delay of the load by a row? Many loggers write with a row what flowed before it.
+/// Are the temperatures ahead of the load by about a row? Many loggers write with a row what flowed before it. Half a
+/// row is averaged over (leeway.cpp), and two are another clock's.
 bool asks_for_load_before(const Problem& problem, const Fit& f) {
-  Eigen::Index at = base_count;
-  for (const Chosen& chosen : f.chosen) {
-    const Cause& cause = cause_of(chosen);
-    const double rows = -f.x[at] / problem.logs.front().interval_s;
-    if (cause.edit == Edit::delay && rows > 0.6 && rows < 1.4) return true;
-    at += static_cast<Eigen::Index>(cause.parameters.size());
-  }
-  return false;
+  const int delay = coordinate_of(f, Edit::delay);
+  const double rows = delay < 0 ? 0 : -f.x[delay] / problem.logs.front().interval_s;
+  return rows > 0.6 && rows < 1.4;
 }
 
+/// The search, and what speaks against answering by it.
 struct Judged {
   Search found;
   std::string poor;  // why there is no verdict; empty: there is one

@@ -514,6 +514,15 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   return usual.cost < best.cost ? usual : best;
 }
 
+int coordinate_of(const Fit& fit, Edit edit) {
+  int at = base_count;
+  for (const Chosen& chosen : fit.chosen) {
+    if (cause_of(chosen).edit == edit) return at;
+    at += coordinates_of({chosen});
+  }
+  return -1;
+}
+
 Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordinates) {
   const Eigen::VectorXd x = motor.x;
   const Eigen::Index shared = base_count + motor.cause_coordinates(), initial = x.size() - shared;

@@ -46,6 +46,9 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
+/// First coordinate of a chosen cause that edits this; -1: none does.
+int coordinate_of(const Fit& fit, Edit edit);
+
 /// The same motor with a further cause of these coordinates: nothing is fitted.
 Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordinates);
 

@@ -486,10 +486,15 @@ Log without_last(Log log, double fraction) {
   return log;
 }
 
+std::vector<double> a_row_sooner(std::vector<double> column) {
+  column.erase(column.begin());
+  column.push_back(column.back());
+  return column;
+}
+
 Log loaded_before(Log log) {
   for (const Role role : {Role::current, Role::id, Role::iq, Role::power, Role::speed}) {
-    std::vector<double>& load = log.of(role);
-    if (!load.empty()) std::rotate(load.begin(), load.begin() + 1, load.end()), load.back() = load.end()[-2];
+    if (log.has(role)) log.of(role) = a_row_sooner(std::move(log.of(role)));
   }
   log.loaded_before = true;
   log.notes.push_back(

@@ -103,6 +103,9 @@ double first_degC(const Log& log);
 /// The rows before the last `fraction` of the log's time.
 Log without_last(Log log, double fraction);
 
+/// Each row with what the next one has, the last with its own.
+std::vector<double> a_row_sooner(std::vector<double> column);
+
 /// The same, each row's load taken for what flowed since the row before it; a note says so.
 Log loaded_before(Log log);
 

@@ -43,16 +43,6 @@ Model<double> hottest_model_of(const Problem& problem, const Fit& f) {
   return hottest;
 }
 
-/// First coordinate of a chosen cause that edits this; -1: none does.
-int coordinate_of(const Fit& f, Edit edit) {
-  int at = base_count;
-  for (const Chosen& c : f.chosen) {
-    if (cause_of(c).edit == edit) return at;
-    at += static_cast<int>(cause_of(c).parameters.size());
-  }
-  return -1;
-}
-
 /// Where the board is to believe that its sensor sits: where it does, less its doubt. A sensor taken to feel more of
 /// the winding than it does makes the winding look cooler, and no trust in a resistance covers that.
 double cautious_share(const Model<double>& m, const Fit& f) {

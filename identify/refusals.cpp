@@ -155,12 +155,7 @@ std::vector<double> told_next(std::vector<double> load) {
 }
 
 /// A row sooner than that.
-std::vector<double> told_sooner(std::vector<double> load) {
-  load = told_next(std::move(load));
-  load.erase(load.begin());
-  load.push_back(load.back());
-  return load;
-}
+std::vector<double> told_sooner(std::vector<double> load) { return a_row_sooner(told_next(std::move(load))); }
 
 /// The same logs under a load that is `as` makes it of what was measured.
 Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double> (*as)(std::vector<double>)) {
@@ -282,15 +277,10 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
-  Eigen::Index at = base_count;
-  for (const Chosen& c : best.chosen) {
-    const Cause& cause = cause_of(c);
-    if (cause.edit == Edit::delay && best.at_bound[static_cast<std::size_t>(at)]) {
-      return fmt::format(
-          "Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
-          cause.parameters[0].high);
-    }
-    at += static_cast<Eigen::Index>(cause.parameters.size());
+  const int delay = coordinate_of(best, Edit::delay);
+  if (delay >= 0 && best.at_bound[static_cast<std::size_t>(delay)]) {
+    return fmt::format("Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
+                       cause_of(best.chosen.front()).parameters[0].high);
   }
   const std::string misread = misread_columns(problem, found, logs, motor);
   if (!misread.empty()) return misread;
