@@ -65,6 +65,11 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
   report.ladder = ladder_of(found);
+  if (found.doubted) {
+    for (const Chosen& chosen : found.sets.front().fit.chosen)
+      report.notes.push_back(
+          fmt::format("What would tell whether it is {}: {}.", cause_of(chosen).name, cause_of(chosen).experiment));
+  }
   if (!names_causes(found.verdict) && found.verdict != Verdict::ambiguous) return;
   const Fit& f = found.chosen.fit;
   for (std::size_t i = 0; i < f.chosen.size(); ++i) {
@@ -131,6 +136,10 @@ std::string sentence(const Search& found, const Report& r) {
       return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}.", miss, sets);
     }
     case Verdict::unknown_cause:
+      if (found.doubted)
+        return fmt::format(
+            "Something is wrong ({}): {} would explain it, and so would a slow disturbance without a name.", miss,
+            listed(names_of(found.sets.front().fit.chosen), " and "));
       return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
     case Verdict::insufficient:
       return "This log cannot tell what the simulation gets wrong.";

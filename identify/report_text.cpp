@@ -134,7 +134,7 @@ std::string cause_heading(const std::string& verdict) {
 }
 
 std::string nearest_words(const HeldOut& h) {
-  return fmt::format("by the nearest set, {}, which is no explanation", h.like);
+  return fmt::format("by the nearest set, {}, which is not believed", h.like);
 }
 
 std::string interval_words(const HeldOut& h) {

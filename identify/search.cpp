@@ -295,8 +295,10 @@ void decide(const Problem& problem, const Left& left, const Disturbance& without
     out.chosen = out.base;
   } else if (!left.believed || (!left.complete && !left.mostly && !(left.nearly && tie))) {
     out.verdict = Verdict::unknown_cause;
-    out.steps.push_back(fmt::format("The best is {}, but {}: none of the known causes explains this.",
-                                    listed(out.chosen.fit.chosen), left.words()));
+    out.doubted = left.complete;
+    out.steps.push_back(fmt::format("The best is {}, but {}: {}.", listed(out.chosen.fit.chosen), left.words(),
+                                    left.complete ? "a slow disturbance without a name may as well be all there is"
+                                                  : "none of the known causes explains this"));
   } else {
     out.verdict = tie ? Verdict::ambiguous : left.complete ? Verdict::explained : Verdict::partly_explained;
     out.remains_K = left.complete ? 0 : left.after_K;

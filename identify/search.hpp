@@ -74,7 +74,8 @@ struct Search {
   std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good as the best, itself first
   std::vector<double> own_gain;                // of each cause chosen: over the set without it
   double remains_K = 0;                        // of a slow disturbance that the sets named or tied leave
-  Noise noise;                                 // of the readings, as the best model's residuals show it
+  bool doubted = false;  // no cause is known, for a slow disturbance explains as much as the first set
+  Noise noise;           // of the readings, as the best model's residuals show it
   Verdict verdict = Verdict::insufficient;
   std::vector<std::string> steps;  // the reasoning in plain words
 };

@@ -606,6 +606,15 @@ TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
   says(small.model_toml, "hot spot");
 }
 
+TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto report =
+      report_of({.core = tests::Core::none, .seed = 770529, .effects = {"radiation"}, .mostly_small = true});
+  ASSERT_EQ(report.verdict, "unknown_cause");
+  says(report.sentence, "radiation would explain it, and so would a slow disturbance without a name");
+  says(report.notes.back(), "What would tell whether it is radiation");
+}
+
 TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
