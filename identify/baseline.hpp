@@ -17,7 +17,8 @@ struct HoldOut {
 Fit fit_baseline(const Problem& problem);
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots) from `fit`.
-void judge_baseline(const Problem& problem, const Fit& fit, const std::vector<Log>& logs,
+/// `judged_ratio`: of what the search saw it leave to the noise, beside what no motor is without; 0: no search.
+void judge_baseline(const Problem& problem, const Fit& fit, double judged_ratio, const std::vector<Log>& logs,
                     const std::optional<wire::pc::MotorFile>& motor, Report& report);
 
 /// Errors over all logs, K; `each`: of every log as well.

@@ -10,6 +10,7 @@
 #include "identify/experiment.hpp"
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
+#include "identify/leeway.hpp"
 #include "identify/model_file.hpp"
 #include "identify/refusals.hpp"
 #include "identify/search.hpp"
@@ -116,7 +117,8 @@ std::string sentence(const Search& found, const Report& r) {
   const std::string miss_and_after = fmt::format("{}, the extended one by {:.2f} K", miss, after_K);
   switch (found.verdict) {
     case Verdict::adequate:
-      return fmt::format("The two-resistor model is adequate: it {}, no more than the noise explains.", by);
+      return fmt::format("The two-resistor model is adequate: it {}, no more than {}.", by,
+                         r.needs_leeway ? fmt::format("the noise and {} explain", leeway_words) : "the noise explains");
     case Verdict::explained:
       return fmt::format("The motor behaves like {}: {}.", in_words(found, found.tied.front()), miss_and_after);
     case Verdict::partly_explained:
@@ -259,12 +261,10 @@ Offer for_the_board(const Problem& problem, const Search& found, Report& report)
   return given;
 }
 
-/// Are the temperatures ahead of the load by about a row? Many loggers write with a row what flowed before it. Half a
-/// row is averaged over (leeway.cpp), and two are another clock's.
-bool asks_for_load_before(const Problem& problem, const Fit& f) {
+/// By how many rows the temperatures are ahead of the load. Many loggers write with a row what flowed before it.
+double rows_ahead(const Problem& problem, const Fit& f) {
   const int delay = coordinate_of(f, Edit::delay);
-  const double rows = delay < 0 ? 0 : -f.x[delay] / problem.logs.front().interval_s;
-  return rows > 0.6 && rows < 1.4;
+  return delay < 0 ? 0 : -f.x[delay] / problem.logs.front().interval_s;
 }
 
 /// The search, and what speaks against answering by it.
@@ -387,11 +387,17 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
-  if (!given.front().loaded_before && asks_for_load_before(problem, found.chosen.fit)) {
-    HoldOut held_too = held;
-    for (std::vector<Log>* some : {&(logs = given), &held_too.logs})
+  // Half a row is averaged over (leeway.cpp). About one is a row's, and so is more where nothing remains of it then.
+  const double ahead = rows_ahead(problem, found.chosen.fit);
+  if (ahead > 0.6 && !given.front().loaded_before) {
+    std::vector<Log> sooner = given;
+    HoldOut held_sooner = held;
+    for (std::vector<Log>* some : {&sooner, &held_sooner.logs})
       std::transform(some->begin(), some->end(), some->begin(), loaded_before);
-    return discover(logs, motor, held_too, doing);
+    Report by_rows = discover(sooner, motor, held_sooner, doing);
+    const bool remains = std::any_of(by_rows.causes.begin(), by_rows.causes.end(),
+                                     [](const CauseLine& c) { return c.id == "clock_delay"; });
+    if (ahead < 1.4 || !remains) return by_rows;
   }
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
@@ -400,7 +406,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty()) nearest = found.chosen.fit;
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
   const Fit two = found.base.fit.valid() ? found.base.fit : base;
-  judge_baseline(problem, two, logs, motor, report);
+  judge_baseline(problem, two, found.base.ratio, logs, motor, report);
   if (!extended) found.chosen.fit = two;
   if (!poor.empty()) {
     found.verdict = Verdict::insufficient;

@@ -124,10 +124,10 @@ bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {
   return true;
 }
 
-Problem believed_less(Problem problem, const std::vector<Chosen>& chosen, double times) {
-  const bool feels_winding =
-      std::any_of(chosen.begin(), chosen.end(), [](const Chosen& c) { return cause_of(c).edit == Edit::sensor_share; });
-  const Unmodelled& unmodelled = feels_winding ? of_a_winding : of_a_housing;
+Problem believed_less(Problem problem, const Fit& f, double times) {
+  const int at = coordinate_of(f, Edit::sensor_share);
+  const Unmodelled felt{at < 0 ? 0 : of_a_winding.share * f.x[at], of_a_winding.over_s};
+  const Unmodelled& unmodelled = felt.share > of_a_housing.share ? felt : of_a_housing;
   const double unmodelled_K = times * unmodelled.share * housing_range_K(problem);
   Noise& noise = problem.noise;
   if (noise.disturbance_K < unmodelled_K) {

@@ -33,8 +33,8 @@ void refine_housing_noise(Problem& problem, const Fit& best);
 /// wrong with a motor, that is taken for its noise where it is likelier than any slow disturbance. Says whether it was.
 bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth);
 
-/// The same readings, believed no closer than `times` what no model follows; `chosen` says where the housing's sensor
-/// sits. Readings of a winding now and then are noisier than that, and what is known to be off by more says it already.
-Problem believed_less(Problem problem, const std::vector<Chosen>& chosen, double times);
+/// The same readings, believed no closer than `times` what no model follows; `f` says where the housing's sensor sits.
+/// Readings of a winding now and then are noisier than that, and what is known to be off by more says it already.
+Problem believed_less(Problem problem, const Fit& f, double times);
 
 }  // namespace identify

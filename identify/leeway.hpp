@@ -6,6 +6,10 @@
 
 namespace identify {
 
+/// In a sentence.
+inline constexpr const char* leeway_words =
+    "what no motor is without (a sensor a little early or late, a frame, the moment of a row)";
+
 /// What no motor is without: a sensor that is not quite on the housing, so that its reading comes early or late by
 /// seconds; a frame that takes a share of the housing's capacity; where the rotor stands under load, phases that share
 /// their heat better or worse than was assumed; and a row whose current and winding were not read at one moment, which

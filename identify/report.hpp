@@ -113,6 +113,7 @@ struct Report {
   std::vector<std::string> notes;   // on the data: masked, assumed, repaired
   std::vector<std::string> checks;  // gradient, residual, identifiability: passed or not, in words
   bool converged = false;
+  bool needs_leeway = false;  // two resistors leave more than noise, and no more beside what no motor is without
   std::vector<ParameterLine> baseline;
   Rmse baseline_rmse, extended_rmse;
   Structure structure;

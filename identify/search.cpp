@@ -71,7 +71,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   if (!(more > nameless + margins.second))
     return fmt::format("{} would gain {:.1f} more than {}, a slow disturbance without a name {:.1f}: stopped there.",
                        both, more, first, nameless);
-  const Problem less = believed_less(problem, pair.fit.chosen, doubted);
+  const Problem less = believed_less(problem, pair.fit, doubted);
   const double still =
       fit(less, single.fit.chosen, {&single.fit}).surprise() - fit(less, pair.fit.chosen, {&pair.fit}).surprise();
   if (!(still > margins.second))
@@ -239,7 +239,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   out.gain = left.gain;
   out.explains = left.evidence - without_causes.evidence;
   // Believed closer, what a motor has and no cause in the table is would count: a frame, teeth, a sensor's own offset.
-  const Problem less = believed_less(judged, chosen, 1);
+  const Problem less = believed_less(judged, found.chosen.fit, 1);
   out.still = fit(less, {}, {&found.base.fit}).surprise() - fit(less, chosen, {&found.chosen.fit}).surprise();
   out.believed = out.explains > margins.tie && out.still > margins.still;
   out.by_parts = gained_by_parts(less, found.chosen.fit);
@@ -320,7 +320,7 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
   in_parallel(likelier.size(), [&](std::size_t i) {
     const Fit& f = out.singles[i].fit;
     if (!(out.singles[i].gain > 0)) return;
-    const Problem less = believed_less(judged, f.chosen, 1);
+    const Problem less = believed_less(judged, f, 1);
     likelier[i] = fit(less, {}, {&out.base.fit}).surprise() - fit(less, f.chosen, {&f}).surprise();
   });
   const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
@@ -351,7 +351,7 @@ void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   if (judged.noise.core_slow_K == 0) judged.leeway.push_back(leeway_of_load(judged, out.base.fit));
   // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
   const auto refit = [&](Fit& f) {
-    const Problem less = believed_less(judged, f.chosen, 1);
+    const Problem less = believed_less(judged, f, 1);
     Fit anew = fit(less, f.chosen);
     f = fit(less, f.chosen, {&f});
     if (anew.valid() && (!f.valid() || anew.cost < f.cost)) f = std::move(anew);

@@ -25,6 +25,7 @@ struct BenchOptions {
   BenchMotor motor;
   double seconds = 900, rate_Hz = 10, ambient_degC = 24, start_degC = 24;
   double white_K = 0.2, slow_K = 0.05, step_K = 0.1;  // housing sensor
+  double sensor_share = 0;                            // of the way from housing to winding, where that sensor sits
   double core_every_s = 0, core_white_K = 0.2;        // 0: no winding reading
   double power_gain = 0;                              // > 0: power is logged instead of current, true heat times this
   std::uint64_t seed = 1;
@@ -64,7 +65,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
     }
     slow = keep * slow + std::sqrt(1 - keep * keep) * o.slow_K * normal(random);
     const double core = (T[0] + T[1] + T[2]) / 3;
-    double housing = T[3] + slow + o.white_K * normal(random);
+    double housing = T[3] + o.sensor_share * (core - T[3]) + slow + o.white_K * normal(random);
     if (o.step_K > 0) housing = o.step_K * std::round(housing / o.step_K);
     const double amplitude = current * 2 / std::sqrt(3.0);
     const double heat25 = m.ohm * amplitude * amplitude;

@@ -473,6 +473,37 @@ TEST(Report, ARowsLoadMayBeWhatFlowedBeforeIt) {
   says(said(logs), "adequate: Current and speed of a row are taken for those since the row before it");
 }
 
+/// A winding that answers within 14 s, and a housing within two minutes: a drone's.
+tests::BenchOptions fast_winding() {
+  tests::BenchOptions options;
+  options.motor = {.ohm = 1.3, .R1 = 0.8, .R2 = 2.2, .C1 = 17.5, .C2 = 50};
+  return options;
+}
+
+TEST(Report, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
+  tests::BenchOptions options = fast_winding();
+  options.sensor_share = 0.15;
+  options.rate_Hz = 1;
+  for (options.seed = 1; options.seed <= 3; ++options.seed) {
+    const identify::Report report = identify::discover(tests::bench_logs({options}), std::nullopt);
+    says(report.sentence, "sensor_placement");  // "adequate" while a whole winding was granted its unevenness
+  }
+}
+
+TEST(Report, RowsMayBeBehindWhereASensorIsToo) {
+  tests::BenchOptions options = fast_winding();
+  options.sensor_share = 0.15;
+  options.rate_Hz = 0.5;
+  options.white_K = 0.1;
+  for (options.seed = 1; options.seed <= 3; ++options.seed) {
+    auto logs = tests::bench_logs({options});
+    auto& current = logs[0].of(identify::Role::current);
+    std::rotate(current.begin(), current.end() - 1, current.end());
+    const identify::Report report = identify::discover(logs, std::nullopt);
+    EXPECT_EQ(report.sentence.find("clock_delay"), std::string::npos) << report.sentence;
+  }
+}
+
 TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
   tests::BenchOptions options;
   options.rate_Hz = 0.5;
