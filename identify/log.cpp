@@ -493,7 +493,7 @@ std::vector<double> a_row_sooner(std::vector<double> column) {
 }
 
 Log loaded_before(Log log) {
-  for (const Role role : {Role::current, Role::id, Role::iq, Role::power, Role::speed}) {
+  for (const Role role : load_roles) {
     if (log.has(role)) log.of(role) = a_row_sooner(std::move(log.of(role)));
   }
   log.loaded_before = true;

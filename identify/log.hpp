@@ -41,6 +41,8 @@ enum class Role {
   count
 };
 inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
+/// What flows and turns.
+inline constexpr Role load_roles[] = {Role::current, Role::id, Role::iq, Role::power, Role::speed};
 
 /// What is read in degC, the motor's own first.
 inline constexpr Role temperatures[] = {Role::core,  Role::housing,   Role::ambient, Role::coolant,

@@ -20,6 +20,10 @@ constexpr const char* in_milliseconds =
     "Read in milliseconds the time column makes a motor that follows the load, and in seconds none; say --column "
     "time_s=COLUMN:ms.";
 
+/// What follows the load where it is read otherwise leaves clearly less than the best as it stands, a likelihood e^20
+/// times as great where a mistaken unit makes it e^100 and more, and a fraction of what two resistors leave.
+constexpr double clearly = 20, fraction_left = 0.25;
+
 /// Are R2 and C2 known from this data?
 bool determines_housing(const Problem& problem, const Fit& f) {
   const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
@@ -79,14 +83,13 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
-  constexpr double clearly = 20;  // a likelihood e^20 times as great, where a mistaken unit makes it e^100 and more
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
   const Fit two = fit(problem, {});
   const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
   const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
     const double left = excess(fit(read, chosen));
-    return left + clearly < explained && left < 0.25 * as_it_stands;
+    return left + clearly < explained && left < fraction_left * as_it_stands;
   };
   const auto follows_better = [&](const std::vector<Log>& otherwise) {
     const Problem read = problem_of(otherwise, motor);
@@ -131,6 +134,52 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
                        columns);
   }
   return "";
+}
+
+/// The same logs with the load so many seconds later, or sooner where that is negative, without the rows that then have
+/// none or nothing else.
+std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs) {
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const auto rows = static_cast<std::ptrdiff_t>(std::abs(late_s) / problem.logs[l].interval_s);
+    for (std::size_t role = 0; role < role_count; ++role) {
+      std::vector<double>& column = logs[l].columns[role];
+      if (column.empty()) continue;
+      const bool load =
+          std::find(std::begin(load_roles), std::end(load_roles), static_cast<Role>(role)) != std::end(load_roles);
+      // Time goes on from zero either way.
+      if (static_cast<Role>(role) == Role::time || load == (late_s > 0))
+        column.erase(column.end() - rows, column.end());
+      else
+        column.erase(column.begin(), column.begin() + rows);
+    }
+  }
+  return logs;
+}
+
+/// Of two clocks farther apart than a clock_delay may be: by how much the temperatures are late; 0: by none. Until they
+/// are put right, a motor that warms where nothing flows makes rest look noisy.
+double clocks_apart_s(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
+                      const std::optional<wire::pc::MotorFile>& motor) {
+  const Chosen clock = {cause_named("clock_delay"), -1};
+  const double reach_s = cause_of(clock).parameters[0].high;
+  double late_s = 0, least = 1e300;
+  for (const double tried_s : {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s}) {
+    const bool room = std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
+      return log.of(Role::time).back() > 4 * std::abs(tried_s) && log.resumes_s.empty();
+    });
+    if (!room) continue;
+    const Problem apart = problem_of(loaded_later(tried_s, problem, logs), motor);
+    Problem together = problem;
+    together.noise = apart.noise;
+    const Fit f = fit(apart, {clock});
+    const double left = excess(f);
+    if (left < least && left + clearly < excess(fit(together, best.chosen, {&best})) &&
+        left < fraction_left * excess(fit(together, {}))) {
+      least = left;
+      late_s = tried_s + f.x[coordinate_of(f, Edit::delay)];
+    }
+  }
+  return late_s;
 }
 
 /// With the two temperatures swapped, does one cause leave no more than the best does as they stand?
@@ -277,6 +326,9 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
+  if (const double late_s = clocks_apart_s(problem, best, logs, motor); late_s != 0)
+    return fmt::format("The temperatures follow the current {:.0f} s {}: two clocks; align the recordings first.",
+                       std::abs(late_s), late_s > 0 ? "late" : "early");
   const int delay = coordinate_of(best, Edit::delay);
   if (delay >= 0 && best.at_bound[static_cast<std::size_t>(delay)]) {
     return fmt::format("Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
