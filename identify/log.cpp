@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 
 #include "identify/filled.hpp"
 #include "identify/masks.hpp"
@@ -289,7 +291,16 @@ void pass_midnights(Log& log) {
                                     midnights == 1 ? "" : "s"));
 }
 
-/// How many rows come before the first heat. One part in a thousand of the most is a sensor's offset.
+/// The mean of the middle half: of two both count, and one reading of three that went wrong does not. Missing when
+/// there is none.
+double middle(std::vector<double> v) {
+  if (v.empty()) return missing;
+  std::sort(v.begin(), v.end());
+  const auto cut = static_cast<std::ptrdiff_t>((v.size() + 1) / 4);
+  return std::accumulate(v.begin() + cut, v.end() - cut, 0.0) / static_cast<double>(std::ssize(v) - 2 * cut);
+}
+
+/// How many rows come before anything heats or turns. One part in a thousand of the most heat is a sensor's offset.
 std::size_t rows_at_rest(const Log& log) {
   const auto heat = [&](std::size_t i) {
     if (log.has(Role::power)) return std::abs(log.of(Role::power)[i]);
@@ -302,16 +313,20 @@ std::size_t rows_at_rest(const Log& log) {
   const std::size_t rows = log.of(Role::time).size();
   double most = 0;
   for (std::size_t i = 0; i < rows; ++i) most = std::max(most, heat(i));
+  const double least_rad_per_s = 0.02 * largest_magnitude(log.of(Role::speed));  // as bins.cpp takes it for idle
+  const auto turns = [&](std::size_t i) {
+    return log.has(Role::speed) && std::abs(log.of(Role::speed)[i]) > least_rad_per_s;
+  };
   std::size_t rest = 0;
-  while (rest < rows && heat(rest) <= 1e-3 * most) ++rest;  // what is not told is no rest
+  while (rest < rows && heat(rest) <= 1e-3 * most && !turns(rest)) ++rest;  // what is not told is no rest
   return rest;
 }
 
 /// The winding's resistance tells its temperature once both are known of one moment: at the start, where a motor that
-/// rested is as warm as the room everywhere. The first readings, five at most, since it may be read now and then only.
+/// rested is as warm as the room everywhere. All readings of that rest count: what they are off by, all that follow
+/// are.
 void read_resistance(Log& log) {
-  constexpr double per_K = 0.00393, at_degC = 20;  // copper
-  constexpr double soaked_K = 1;                   // two sensors beside each other differ by as much
+  constexpr double soaked_K = 1;  // two sensors beside each other differ by as much
   if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
   std::vector<double>& ohm = log.of(Role::winding_ohm);
   int nothing = 0;
@@ -322,17 +337,17 @@ void read_resistance(Log& log) {
     log.notes.push_back(fmt::format("Cells of winding_ohm that say 0 or less are taken for no reading: {}.", nothing));
   const std::size_t rest = rows_at_rest(log);
   const auto at_rest = [&](Role role) {
-    std::vector<double> first;
-    for (std::size_t i = 0; log.has(role) && i < rest && first.size() < 5; ++i) {
-      if (!std::isnan(log.of(role)[i])) first.push_back(log.of(role)[i]);
+    std::vector<double> readings;
+    for (std::size_t i = 0; log.has(role) && i < rest; ++i) {
+      if (!std::isnan(log.of(role)[i])) readings.push_back(log.of(role)[i]);
     }
-    return first;
+    return readings;
   };
   const std::vector<double> readings_ohm = at_rest(Role::winding_ohm);
-  const double start_ohm = median(readings_ohm), start_degC = median(at_rest(Role::housing));
+  const double start_ohm = middle(readings_ohm), start_degC = middle(at_rest(Role::housing));
   bool soaked = !readings_ohm.empty() && !std::isnan(start_degC);
   for (const Role role : {Role::ambient, Role::coolant})
-    soaked = soaked && (!log.has(role) || std::abs(median(at_rest(role)) - start_degC) <= soaked_K);
+    soaked = soaked && (!log.has(role) || std::abs(middle(at_rest(role)) - start_degC) <= soaked_K);
   if (!soaked) {
     log.notes.push_back(
         "winding_ohm is not used, since its temperature is known at no moment: begin the log at rest, all at room "
@@ -341,8 +356,8 @@ void read_resistance(Log& log) {
   }
   log.of(Role::core) = std::move(ohm);
   ohm.clear();
-  const double per_ohm = (1 + per_K * (start_degC - at_degC)) / start_ohm;
-  for (double& x : log.of(Role::core)) x = at_degC + (per_ohm * x - 1) / per_K;
+  log.core_reference = {start_degC, readings_ohm.size()};
+  for (double& x : log.of(Role::core)) x = no_ohm_degC + x / start_ohm * (start_degC - no_ohm_degC);
   log.notes.push_back(fmt::format(
       "winding_ohm is read as core_degC by copper's 0.393 %/K, from {:.4g} ohm at {:.1f} degC at the "
       "start ({} reading{}), where all of the motor is taken to be as warm as its housing; leads in it that "

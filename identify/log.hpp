@@ -73,6 +73,16 @@ ColumnMap read_map(const std::string& path);
 /// Adds "role=column" or "role=column:unit" to a map; `from`: where it was said, for complaints.
 void add_column(ColumnMap& map, const std::string& text, const std::string& from = "--column ");
 
+/// Where copper's straight line, 0.393 %/K of 20 degC, has no resistance left: from there a winding's temperature goes
+/// in proportion to it.
+inline constexpr double no_ohm_degC = 20 - 1 / 0.00393;
+
+/// What a winding that its resistance tells goes by.
+struct Reference {
+  double degC = missing;     // the motor at rest
+  std::size_t readings = 0;  // of the resistance there; 0: the winding was read as a temperature
+};
+
 struct Log {
   std::string name;
   std::array<std::vector<double>, role_count> columns;
@@ -82,6 +92,7 @@ struct Log {
   std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
   double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
+  Reference core_reference = {};  // of readings of the winding
   bool loaded_before = false;     // a row's load flowed since the row before, not until the next one
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -449,6 +450,19 @@ TEST(Reader, AResistanceIsReadAsATemperatureFromAStartAtRest) {
     says(log.notes.front(),
          "winding_ohm is read as core_degC by copper's 0.393 %/K, from 0.5 ohm at 24.5 degC at the start (4 readings)");
   }
+}
+TEST(Reader, AllReadingsOfAResistanceAtRestAreItsReferenceUntilSomethingTurns) {
+  // Seven at rest, the fourth gone wrong.
+  std::string text = "time_s,housing_degC,current_A,speed_rad_per_s,winding_ohm\n";
+  for (int i = 0; i < 40; ++i)
+    text += fmt::format("{},20,{},{},{}\n", i, i < 20 ? 0 : 3, i < 7 ? 0 : 100,
+                        i == 3  ? 9.9
+                        : i < 7 ? 1 + 0.01 * i
+                                : 2);
+  const Log log = read(text)[0];
+  EXPECT_EQ(log.core_reference.readings, 7u);
+  EXPECT_EQ(log.core_reference.degC, 20);
+  EXPECT_NEAR(log.of(Role::core)[0], 20 + (1 / ((1.02 + 1.04 + 1.05) / 3) - 1) / 0.00393, 1e-9) << "the middle three";
 }
 TEST(Reader, AResistanceOfNothingIsNoReading) {
   std::string text = resistance_log(24, 0);
