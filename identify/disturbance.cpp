@@ -33,6 +33,18 @@ double housing_range_K(const Problem& problem) {
   return std::max(0.0, high - low);
 }
 
+/// The share of a winding's resistance by which all its readings are off: no noise of each.
+double off_by_reference(const Replayed& r) {
+  double product = 0, square = 0;
+  for (std::size_t k = 0; k < r.core_degC.size(); ++k) {
+    if (std::isnan(r.core_residual_K[k])) continue;
+    const double above_K = r.core_degC[k] - no_ohm_degC;
+    product += r.core_residual_K[k] * above_K;
+    square += above_K * above_K;
+  }
+  return square > 0 ? product / square : 0;
+}
+
 /// Of a fit to the problem's noise; to compare fits that assume different noise.
 double evidence(const Problem& problem, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(problem); }
 
@@ -81,8 +93,11 @@ void refine_core_noise(Problem& problem, const Fit& best) {
   double sum = 0;
   int n = 0;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    for (const double r : replayed(problem, best, l).core_residual_K) {
-      if (!std::isnan(r)) sum += r * r, ++n;
+    const Replayed r = replayed(problem, best, l);
+    const double shared = problem.logs[l].core_reference.readings > 0 ? off_by_reference(r) : 0;
+    for (std::size_t k = 0; k < r.core_degC.size(); ++k) {
+      const double own_K = r.core_residual_K[k] - shared * (r.core_degC[k] - no_ohm_degC);
+      if (!std::isnan(own_K)) sum += own_K * own_K, ++n;
     }
   }
   if (n >= 10) problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), 0.5, 3.0);

@@ -136,7 +136,7 @@ struct Evaluation {
   int readings = 0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information;
-  Eigen::VectorXd leeway;  // what the residuals show of each effect averaged over
+  Eigen::VectorXd leeway;  // what the residuals show of each effect averaged over, a column of Averaged each
 };
 
 template <int N>
@@ -148,9 +148,8 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
   out.readings = 0;
   out.gradient = Eigen::VectorXd::Zero(all);
   out.information = Eigen::MatrixXd::Zero(all, all);
-  const auto effects = static_cast<Eigen::Index>(averaged.effects.size());
-  Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, effects);
-  Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(effects);
+  Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, averaged.columns());
+  Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(averaged.columns());
   int own = shared;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
@@ -173,9 +172,11 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
           out.information(place(i), place(j)) += sums.H[i].slope(j);
           if (i != j) out.information(place(j), place(i)) += sums.H[i].slope(j);
         }
-        for (Eigen::Index e = 0; e < effects; ++e) with_averaged(place(i), e) += sums.with_averaged[e].slope(i);
+        for (std::size_t e = 0; e < averaged.effects.size(); ++e)
+          with_averaged(place(i), averaged.column(e, l)) += sums.with_averaged[e].slope(i);
       }
-      for (Eigen::Index e = 0; e < effects; ++e) residual_with_averaged[e] += sums.with_averaged[e].v;
+      for (std::size_t e = 0; e < averaged.effects.size(); ++e)
+        residual_with_averaged[averaged.column(e, l)] += sums.with_averaged[e].v;
       out.misfit += sums.misfit;
       out.readings += sums.readings;
       sums = {};
@@ -324,8 +325,8 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
     linearise();
   }
   out.narrowing = narrowing(H, c, held);
-  for (Eigen::Index i = 0; i < now.leeway.size(); ++i)
-    out.uneven_per_A2 += now.leeway[i] * problem.leeway[static_cast<std::size_t>(i)].uneven_per_A2;
+  for (std::size_t i = 0; i < problem.leeway.size(); ++i)
+    out.uneven_per_A2 += now.leeway[averaged.column(i, 0)] * problem.leeway[i].uneven_per_A2;
   // From phases that share their heat at once to phases that share none (problem.cpp).
   out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
   out.x = x;

@@ -28,6 +28,23 @@ const double ordinary_ripple_share = 1 / std::sqrt(12.0);
 /// (designed, hidden motor 4110).
 constexpr double ordinary_load_share = 0.002;
 
+/// How well a winding that its resistance tells is known where its reference was taken. The middle half of normal
+/// readings tells their mean to 1.1 times what all of them do. The housing is read as often or more, but what it
+/// wanders by, or where between its steps it stood, is the same for the whole of a rest.
+double reference_sd_K(const Noise& noise, const Bins& log) {
+  const double each_K = 1.1 * std::hypot(noise.core_white_K, noise.housing_white_K);
+  return std::hypot(each_K / std::sqrt(static_cast<double>(log.core_reference.readings)), noise.housing_slow_K,
+                    log.housing_step_K / std::sqrt(12.0));
+}
+
+/// What that makes of a winding's temperatures: all in proportion to the resistance.
+std::vector<double> off_by_reference_K(std::vector<double> core_degC, const Noise& noise, const Bins& log) {
+  const double share =
+      log.core_reference.readings > 0 ? reference_sd_K(noise, log) / (log.core_reference.degC - no_ohm_degC) : 0;
+  for (double& x : core_degC) x = share * (x - no_ohm_degC);
+  return core_degC;
+}
+
 /// How far apart two simulations of one log are, `times` over.
 std::vector<double> apart_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
   for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
@@ -70,7 +87,9 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     for (Bin& bin : log.bins)
       bin.input[thermal::Drive::current_A2] += ordinary_ripple_share * log.current_noise_A * log.current_noise_A;
   }
-  Leeway lateness, frame, phases, moment, ahead, ripple;
+  Leeway lateness, frame, phases, moment, ahead, ripple, reference;
+  reference.of_each_log = true;
+  bool by_resistance = false;
   phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
@@ -93,11 +112,15 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
     ripple.housing_K.push_back(apart_K(heated.housing_degC, even.housing_degC));
     ripple.core_K.push_back(apart_K(heated.core_degC, even.core_degC));
+    by_resistance = by_resistance || problem.logs[l].core_reference.readings > 0;
+    reference.housing_K.emplace_back(plain.core_degC.size(), 0.0);
+    reference.core_K.push_back(off_by_reference_K(even.core_degC, problem.noise, problem.logs[l]));
   }
   std::vector<Leeway> out = {lateness, frame};
   if (problem.uneven_per_A2 > 0) out.push_back(phases);
   if (problem.noise.core_slow_K > 0) out.insert(out.end(), {ahead, moment});
   if (ripples && !problem.heated_by_power()) out.push_back(ripple);
+  if (by_resistance) out.push_back(reference);
   return out;
 }
 

@@ -12,8 +12,10 @@ inline constexpr const char* leeway_words =
 
 /// What no motor is without: a sensor that is not quite on the housing, so that its reading comes early or late by
 /// seconds; a frame that takes a share of the housing's capacity; where the rotor stands under load, phases that share
-/// their heat better or worse than was assumed; and a row whose current and winding were not read at one moment, which
-/// shows where every row has a winding's temperature: hundredths of a second looked like a hot spot or a delay there.
+/// their heat better or worse than was assumed; a row whose current and winding were not read at one moment, which
+/// shows where every row has a winding's temperature: hundredths of a second looked like a hot spot or a delay there;
+/// and a winding told by its resistance that is off by what the reference at rest was, which looked like a gain of the
+/// housing's sensor.
 /// Causes are to be ranked by more than that. By the best fit at hand: where something is missing, that of two
 /// resistors alone is no motor.
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor);

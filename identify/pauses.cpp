@@ -159,6 +159,7 @@ std::vector<Log> parts_between_pauses(Log log) {
   for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
     part.sink_degC = first_degC(log);
+    part.core_reference = log.core_reference;
     const std::size_t readings = std::max(count_told(part.of(Role::housing)), count_told(part.of(Role::core)));
     if (to - from >= least_rows && readings >= least_readings)
       parts.push_back(std::move(part));

@@ -47,6 +47,7 @@ struct Noise {
 /// and bin. A fit averages over it (prior standard deviation 1 in that unit).
 struct Leeway {
   std::vector<std::vector<double>> housing_K, core_K;
+  bool of_each_log = false;  // each log has its own amount of it; else all have the same
   double uneven_per_A2 = 0;  // of uneven phases: that ordinary size, on top of Problem::uneven_per_A2
 };
 

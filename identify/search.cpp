@@ -90,18 +90,22 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
 }
 
 /// Every cause alone, more than once: the best of a round shows what motor it is, which leeway goes by, and how noisy
-/// the readings are, and with that all are fitted again.
-void fit_alone_and_settle_noise(Problem& problem, const std::vector<Chosen>& all, const Margins& margins, Field& field,
-                                Search& out) {
+/// the readings are, and with that all are fitted again. `ordinary`: by which leeway went before.
+void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vector<Chosen>& all, const Margins& margins,
+                                Field& field, Search& out) {
   fit_alone(problem, all, field);
   if (field.singles.empty()) return;
   const auto best = [&]() -> const Fit& {
     return field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
   };
-  if (field.singles.front().gain > margins.detect) problem.leeway = ordinary_leeway(problem, best());
+  if (field.singles.front().gain > margins.detect)
+    problem.leeway = ordinary_leeway(problem, ordinary = field.singles.front().fit);
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
   refine_housing_noise(problem, best());
-  if (sparse_core) refine_core_noise(problem, best());
+  if (sparse_core) {
+    refine_core_noise(problem, best());
+    problem.leeway = ordinary_leeway(problem, ordinary);  // a resistance at rest is as noisy as any other
+  }
   fit_alone(problem, all, field);
   const double at_rest_K = problem.noise.housing_slow_K;
   if (!take_sticking_for_noise(problem, best(), margins.remains)) return;
@@ -393,8 +397,9 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Field field;
   const auto all = available(problem, without);
   doing("fitting each cause alone");
-  problem.leeway = ordinary_leeway(problem, fit(problem, {}));
-  fit_alone_and_settle_noise(problem, all, margins, field, out);
+  const Fit two_resistors = fit(problem, {});
+  problem.leeway = ordinary_leeway(problem, two_resistors);
+  fit_alone_and_settle_noise(problem, two_resistors, all, margins, field, out);
   out.base = out.chosen = field.base;
   out.noise = problem.noise;
   out.singles = field.singles;

@@ -51,16 +51,21 @@ struct Whitener {
         P_disturbed(disturbance2) {}
 };
 
-/// What whitened readings see of the ordinary effects S that a fit averages over, a column each. So averaged, residuals
-/// have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1 S^T.
+/// What whitened readings see of the ordinary effects S that a fit averages over, a column each, or one for each log
+/// where each has its own. So averaged, residuals have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1
+/// S^T.
 struct Averaged {
-  static constexpr std::size_t most = 6;
+  static constexpr std::size_t most = 7;
   std::vector<Leeway> effects;  // whitened
   Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
   double log_determinant = 0;
 
   explicit Averaged(const Problem& problem) : effects(problem.leeway) {
-    const auto n = static_cast<Eigen::Index>(effects.size());
+    Eigen::Index n = 0;
+    for (const Leeway& effect : effects) {
+      first.push_back(n);
+      n += effect.of_each_log ? static_cast<Eigen::Index>(problem.logs.size()) : 1;
+    }
     Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(n, n);
     for (std::size_t l = 0; l < problem.logs.size() && n > 0; ++l) {
       const Bins& log = problem.logs[l];
@@ -71,11 +76,21 @@ struct Averaged {
     log_determinant = std::log(sum.determinant());
   }
 
+  Eigen::Index columns() const { return inverse.cols(); }
+  Eigen::Index column(std::size_t effect, std::size_t log) const {
+    return first[effect] + (effects[effect].of_each_log ? static_cast<Eigen::Index>(log) : 0);
+  }
+
  private:
+  std::vector<Eigen::Index> first;  // column of each effect, of the first log
+
   void whiten(Whitener w, const Bins& log, float Bin::*readings, std::vector<std::vector<double>> Leeway::*channel,
               std::size_t l, Eigen::MatrixXd& sum) {
     const auto n = static_cast<Eigen::Index>(effects.size());
+    std::vector<Eigen::Index> at;
+    for (std::size_t i = 0; i < effects.size(); ++i) at.push_back(column(i, l));
     Eigen::VectorXd wander = Eigen::VectorXd::Zero(n), disturbance = wander, s = wander;
+    Eigen::MatrixXd of_log = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       if (log.bins[k].*readings > 0) {
         w.reading(static_cast<double>(log.bins[k].*readings));
@@ -85,12 +100,13 @@ struct Averaged {
         }
         wander += w.gain / w.weight * s;
         disturbance += w.gain_disturbed / w.weight * s;
-        sum += s * s.transpose();
+        of_log += s * s.transpose();
       }
       w.step();
       wander *= w.keep;
       disturbance *= w.keep_disturbed;
     }
+    sum(at, at) += of_log;
   }
 };
 

@@ -27,6 +27,7 @@ struct BenchOptions {
   double white_K = 0.2, slow_K = 0.05, step_K = 0.1;  // housing sensor
   double sensor_share = 0;                            // of the way from housing to winding, where that sensor sits
   double core_every_s = 0, core_white_K = 0.2;        // 0: no winding reading
+  double ohm_noise_share = 0;                         // > 0: the winding tells its resistance instead, so noisy
   double power_gain = 0;                              // > 0: power is logged instead of current, true heat times this
   std::uint64_t seed = 1;
   std::function<double(double, std::mt19937_64&)> current_A;      // of time; empty: random holds
@@ -41,7 +42,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
   std::uniform_real_distribution<double> uniform;
   std::ofstream out(path);
   out << "time_s," << (o.power_gain > 0 ? "power_W" : "current_A") << ",speed_rad_per_s,housing_degC,ambient_degC";
-  if (o.core_every_s > 0) out << ",core_degC";
+  if (o.core_every_s > 0) out << (o.ohm_noise_share > 0 ? ",winding_ohm" : ",core_degC");
   out << "\n";
   using State = std::array<double, 4>;  // three phases, housing
   State T;
@@ -77,7 +78,10 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
     if (o.core_every_s > 0) {
       out << ',';
       if (row >= next_core) {
-        out << core + o.core_white_K * normal(random);
+        if (o.ohm_noise_share > 0)  // copper, of two phases
+          out << m.ohm / 0.75 * (1 + 0.00393 * (core - 20)) * (1 + o.ohm_noise_share * normal(random));
+        else
+          out << core + o.core_white_K * normal(random);
         next_core = row + std::lround(o.core_every_s * o.rate_Hz);
       }
     }

@@ -8,8 +8,10 @@
 
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <random>
 #include <sstream>
+#include <utility>
 
 #include "host-sim/plant/hidden_causes.hpp"
 #include "identify/baseline.hpp"
@@ -367,6 +369,51 @@ TEST(NoisyCurrent, DoesNotMakeTheSpeedOfAFanTheOnlyCause) {
       return ids == std::vector<std::string>{"board_heat"};
     });
     EXPECT_TRUE(told) << seed << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+  }
+}
+
+/// Of a winding told by its resistance every ten seconds, noisy by 1 K each at rest: three before anything flows tell
+/// all that follow to 0.6 K there, and to 0.8 K at 100 degC.
+tests::BenchOptions told_by_resistance(std::uint64_t seed) {
+  tests::BenchOptions o;
+  o.core_every_s = 10;
+  o.ohm_noise_share = 0.004;
+  o.seed = seed;
+  return o;
+}
+
+identify::Search found_in(std::initializer_list<tests::BenchOptions> each) {
+  const auto logs = tests::bench_logs(each);
+  EXPECT_GE(logs[0].core_reference.readings, 3u);
+  return identify::search(identify::problem_of(logs, tests::ec_16()));
+}
+
+TEST(Resistance, WhatAllReadingsAreOffByIsNoCause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const auto found = found_in({told_by_resistance(seed)});
+    EXPECT_EQ(found.verdict, Verdict::adequate) << seed << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+    EXPECT_NEAR(found.noise.core_white_K, 0.004 * (60 - identify::no_ohm_degC), 0.35) << seed << ": of each for itself";
+  }
+}
+
+TEST(Resistance, EachLogHasAReferenceOfItsOwn) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // Off by 1.5 and -1.5 K at rest, by -1.2 and 1.0.
+  for (const auto& [one, other] : {std::pair(7, 10), std::pair(8, 3)}) {
+    const auto found = found_in({told_by_resistance(one), told_by_resistance(other)});
+    EXPECT_EQ(found.verdict, Verdict::adequate) << one << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+  }
+}
+
+TEST(Resistance, BesideItACauseIsFound) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    tests::BenchOptions fanned = told_by_resistance(seed);
+    fanned.extra_housing_W = [](double t, double, double housing) { return t < 450 ? 0 : -0.04 * (housing - 24); };
+    const auto found = found_in({fanned});
+    EXPECT_TRUE(names(found)) << seed << ": " << fmt::format("{}", fmt::join(found.steps, "\n"));
+    EXPECT_EQ(found.tied, (std::vector<std::vector<std::string>>{{"cooling_change"}})) << seed;
   }
 }
 
