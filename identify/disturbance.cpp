@@ -10,14 +10,13 @@
 namespace identify {
 namespace {
 
-constexpr double least_slow_K = 0.02;            // below it a thermistor's slow noise hides behind its steps
 constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: the moment between two rows
 
 /// What no model of a few nodes follows, as a share of the housing's rise, slow. A housing believed to the hundredths
 /// of a kelvin that its sensor wanders by outvotes a winding read twice a minute: of a motor recorded in host-sim
 /// (gain, seed 503) C1 came out 13 percent too large with a standard error of 3; from a winding read all the time it
 /// is 1.
-constexpr struct Unmodelled { double share, over_s; } of_a_housing{0.001, 240};
+constexpr struct Unmodelled { double share, over_s; } of_a_housing{0.001, slow_disturbance_s};
 /// A winding has no single temperature: a sensor that feels it sees phases, teeth and end turns go their own ways
 /// within seconds. Believed as a housing, such sensors of host-sim came out on the very winding (602, 10003, 10045;
 /// true is 0.9 of the way), and as a winding within two of their standard errors.
@@ -52,9 +51,8 @@ double evidence(const Problem& problem, const Fit& f) { return -f.surprise() - 2
 
 Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   const double own = evidence(problem, undisturbed);
-  // One to four minutes: slower ones are the model's own time constants, faster ones the sensor's wander. Half as large
-  // again each time: coarser than that loses a gain of three.
-  constexpr double slow_s[] = {60, 240}, past_top = 20;
+  // Half as large again each time: coarser than that loses a gain of three.
+  constexpr double slow_s[] = {fast_disturbance_s, slow_disturbance_s}, past_top = 20;
   std::vector<Disturbance> tried[std::size(slow_s)];
   in_parallel(std::size(slow_s), [&](std::size_t i) {
     Problem disturbed = problem;

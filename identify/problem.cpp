@@ -19,6 +19,11 @@ constexpr double most_fine_bins = 36000;
 
 using thermal::Drive;
 
+/// Of rest: about six second differences over eight seconds stand in it side by side.
+constexpr double block_s = 90, free_of_six = 6.0 / 5;
+/// The winding still empties into the housing: of a small motor it has a time constant of 1 to 20 s (pauses.cpp).
+constexpr double after_load_s = 20;
+
 /// Second differences, over a lag, of means over a second at rest: they cancel the slope of a cooling curve.
 struct AtRest {
   double sum = 0;    // of their squares
@@ -37,15 +42,14 @@ AtRest at_rest(const Bins& fine, double lag_s) {
   AtRest out;
   const Bins log = merged(fine, static_cast<std::size_t>(std::max(1.0, std::round(1 / fine.width_s))));
   const auto j = static_cast<std::size_t>(std::max(1.0, std::round(lag_s / log.width_s)));
-  const auto block = static_cast<std::size_t>(90 / log.width_s) + 1;
-  const auto after_load = static_cast<std::size_t>(20 / log.width_s);  // the winding still empties into the housing
+  const auto block = static_cast<std::size_t>(block_s / log.width_s) + 1;
+  const auto after_load = static_cast<std::size_t>(after_load_s / log.width_s);
   std::size_t resting = 0;
   std::vector<double> differences;
   const auto close = [&] {  // what a block's differences share is the cooling curve's curvature
     double mean = 0;
     for (const double d : differences) mean += d / static_cast<double>(differences.size());
-    for (const double d : differences)
-      out.sum += (d - mean) * (d - mean) * 1.2;  // a block holds about six independent ones
+    for (const double d : differences) out.sum += (d - mean) * (d - mean) * free_of_six;
     out.n += static_cast<int>(differences.size());
     differences.clear();
   };
@@ -70,6 +74,8 @@ AtRest at_rest(const Bins& fine, double lag_s) {
 void noise_from_rest(Problem& problem) {
   // Over eight seconds what is white is little beside what is slow; over two it is much.
   constexpr double lag_s = 8, short_s = 2;
+  constexpr double last_digit_K = 0.01;  // of a channel that repeats itself perfectly: of steps of 0.035 K, rms
+  constexpr double most_slow_K = 1;      // what wanders more at rest is no sensor's noise
   AtRest all, close_by;
   double reading2 = 0;
   int logs = 0;
@@ -84,22 +90,21 @@ void noise_from_rest(Problem& problem) {
     add(close_by, at_rest(log, short_s));
   }
   Noise& noise = problem.noise;
-  // A perfectly repeating channel still has its last digit.
-  noise.housing_white_K = std::max(0.01, logs > 0 ? std::sqrt(reading2 / logs) : 0.2);
+  noise.housing_white_K = std::max(last_digit_K, std::sqrt(reading2 / std::max(logs, 1)));
   const double kept = AtRest::kept(lag_s, noise.slow_s);
-  const double assumed2 = 0.05 * 0.05;  // a thermistor's slow wander where no rest tells
+  constexpr double assumed2 = usual_slow_K * usual_slow_K;
   // A filtered sensor differs little from reading to reading, and yet wanders within a second or two.
   if (close_by.n > 0 && close_by.white > 0) {
     const double more = (close_by.sum - AtRest::kept(short_s, noise.slow_s) * assumed2 * close_by.n) / close_by.white;
     const double independent = close_by.s / (2 * short_s);
-    if (more > 1 + 3 * std::sqrt(2 / independent)) {
+    if (more > 1 + 3 * std::sqrt(2 / independent)) {  // three standard deviations of a variance
       noise.housing_white_K *= std::sqrt(more);
       all.white *= more;
     }
   }
   const double seen2 = all.n > 0 ? std::max(0.0, (all.sum - all.white) / (all.n * kept)) : assumed2;
   const double trust = all.s / (all.s + 300);  // five minutes of rest count as much as what is assumed
-  noise.housing_slow_K = std::clamp(std::sqrt(trust * seen2 + (1 - trust) * assumed2), 0.02, 1.0);
+  noise.housing_slow_K = std::clamp(std::sqrt(trust * seen2 + (1 - trust) * assumed2), least_slow_K, most_slow_K);
   noise.idle_s = all.s;
 
   // Winding: a dense channel shows its noise; readings further apart than the winding's own motion do not.
@@ -117,7 +122,8 @@ void noise_from_rest(Problem& problem) {
     noise.core_white_K = std::max(0.02, std::sqrt(core2 / dense));
     noise.core_slow_K = 2 * noise.housing_slow_K;  // a winding has no single temperature: a sensor on it wanders more
   } else {
-    noise.core_white_K = 2;  // what resistance at standstill gives
+    // What resistance at standstill gives, as host-sim has it; then its residuals tell (disturbance.cpp).
+    noise.core_white_K = 2;
     noise.core_slow_K = 0;
   }
 }
@@ -250,7 +256,7 @@ void allow_for_noisy_current(Problem& problem) {
   };
   Noise& noise = problem.noise;
   noise.disturbance_K = std::sqrt(gathered_K2(left2_s, b.R2_K_per_W, b.C2_J_per_K));
-  noise.disturbance_s = std::clamp(b.R2_K_per_W * b.C2_J_per_K, 60.0, 240.0);
+  noise.disturbance_s = std::clamp(b.R2_K_per_W * b.C2_J_per_K, fast_disturbance_s, slow_disturbance_s);
   noise.of_current_K =
       std::sqrt(gathered_K2(told2_s, b.R2_K_per_W, b.C2_J_per_K) + gathered_K2(told2_s, b.R1_K_per_W, b.C1_J_per_K));
 }

@@ -33,14 +33,22 @@ struct Belief {
   double winding_max_degC = 155;
 };
 
+/// What a thermistor on a housing wanders by, and within how long: assumed as host-sim's is (thermal_bench.hpp,
+/// LogNoise) where no rest tells. Less hides behind the steps of 0.1 K that it is read in.
+inline constexpr double usual_slow_K = 0.05, usual_slow_s = 20, least_slow_K = 0.02;
+/// A slow disturbance takes one to four minutes: a slower one is the model's own time constants, a faster one the
+/// sensor's wander.
+inline constexpr double fast_disturbance_s = 60, slow_disturbance_s = 240;
+
 /// A reading = truth + white + slow, slow a first-order process; the mean of n readings has white / sqrt(n). Where a
 /// model is known to be off for reasons without a name, a disturbance comes on top: another one, slower.
 struct Noise {
-  double housing_white_K = 0.2, housing_slow_K = 0.05, slow_s = 20;
-  double core_white_K = 1, core_slow_K = 0;      // slow 0: read so rarely that all is white
-  double disturbance_K = 0, disturbance_s = 60;  // of the housing; a winding that wanders more is disturbed more
-  double idle_s = 0;                             // how much rest it was taken from; 0: assumed
-  double of_current_K = 0;                       // what the noise of the current moves a simulated winding, rms
+  double housing_white_K = 0.2, housing_slow_K = usual_slow_K, slow_s = usual_slow_s;
+  double core_white_K = 1, core_slow_K = 0;  // slow 0: read so rarely that all is white
+  // Of the housing; a winding that wanders more is disturbed more.
+  double disturbance_K = 0, disturbance_s = fast_disturbance_s;
+  double idle_s = 0;        // how much rest it was taken from; 0: assumed
+  double of_current_K = 0;  // what the noise of the current moves a simulated winding, rms
 };
 
 /// What no motor is without and no cause is to be named for: how far its ordinary size moves the readings, for each log
