@@ -48,8 +48,8 @@ void mask_frozen(Log& log, Role role) {
                   own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
 }
 
-/// Of each reading and those around it, within half a second and ten rows either way: noise that reaches over the next
-/// step now and then is no step.
+/// Of each reading and those around it, within half a second and ten rows either way (half of hurry_s; more rows cost):
+/// noise that reaches over the next step now and then is no step.
 std::vector<double> medians_around(const std::vector<double>& v, double usual_s) {
   const auto reach = static_cast<std::size_t>(std::clamp(0.5 / usual_s, 0.0, 10.0));
   std::vector<double> out = v, near;
@@ -94,8 +94,9 @@ std::vector<Step> flutters_of(const std::vector<Step>& steps, const std::vector<
 /// began, while a winding does go and come back within seconds. Of steps to different degrees that follow each other
 /// within a second the moments are not known well enough.
 void read_between_steps(Log& log, Role role) {
-  // Of the steps of housings none followed another within a second; of sensors that feel a winding, a tenth and more
-  // did (score's motors, whole degrees, seeds 1 to 5).
+  // Chosen: half or double of all but flutter_s, and of what medians_around reaches, at once leaves the answer on a log
+  // in whole degrees. Of the steps of housings none followed another within a second; of sensors that feel a winding, a
+  // tenth and more did (score's motors, whole degrees, seeds 1 to 5).
   constexpr double flutter_s = 2, hurry_s = 1, most_hurried = 0.1;
   constexpr std::size_t least_steps = 4;
   std::vector<double>& v = log.of(role);
@@ -112,7 +113,7 @@ void read_between_steps(Log& log, Role role) {
     if (t[i] - t[i - 1] > apart_s) continue;  // when in a gap is not known
     steps.push_back({i, i, (settled[i] + settled[i - 1]) / 2});
   }
-  const double share = role == Role::housing ? 0.25 : 0;
+  const double share = role == Role::housing ? 0.25 : 0;  // at an eighth a long flutter is two (tests: Masks)
   steps = flutters_of(steps, t, share, std::max(flutter_s, apart_s));
   if (role == Role::housing)
     std::erase_if(steps, [&](const Step& step) { return settled[step.last] == settled[step.first - 1]; });
@@ -153,7 +154,9 @@ double missing_of_input(const Log& log, Role role) {
     last_s = t[i];
   }
   const double grid_s = median(spacing_s);
-  const auto late = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) { return s > 1.5 * grid_s; });
+  constexpr double late_times = 1.5;  // half way to where one is missing
+  const auto late =
+      std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) { return s > late_times * grid_s; });
   const double of_rows = static_cast<double>(v.size() - count_told(v)) / static_cast<double>(v.size());
   if (spacing_s.size() < 10 || 10 * static_cast<std::size_t>(late) > spacing_s.size()) return of_rows;
   const double of_time =
@@ -163,6 +166,9 @@ double missing_of_input(const Log& log, Role role) {
 
 /// What heats. A hole in it is bridged by its neighbours, which is only honest for short ones.
 void note_missing_input(Log& log) {
+  // With 15 and 29 percent of the cells gone two hidden logs of two got no name in the end (too_sparse); this says so
+  // at once.
+  constexpr double most_missing = 0.3;
   std::vector<Role> input = {heat_of(log)};
   if (input.front() == Role::iq && log.has(Role::id))
     input.push_back(Role::id);
@@ -171,7 +177,7 @@ void note_missing_input(Log& log) {
   for (const Role role : input) {
     const double share = missing_of_input(log, role);
     log.missing_share = std::max(log.missing_share, share);
-    if (share > 0.3) {
+    if (share > most_missing) {
       throw UserError(
           Exit::unusable,
           fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
@@ -229,6 +235,7 @@ void note_gaps(Log& log) {
 
 /// Rows of readings, up to three in a row, that jump away and back as no temperature can.
 std::vector<std::size_t> temperature_glitches(const Log& log, Role role) {
+  // Chosen: half or double of these at once leaves the answer on a log with four such glitches.
   constexpr double jump_K = 10;  // and back; beyond any thermistor's noise
   constexpr std::size_t most = 3;
   // Nothing that warms by so much is back within these times: a winding cools in 1 s and more, a housing in minutes.
@@ -346,9 +353,12 @@ std::vector<std::pair<std::size_t, std::size_t>> frozen_runs(const std::vector<d
   for (const Run& run : runs) lengths.push_back(run.readings);
   std::sort(lengths.begin(), lengths.end());
   const double usual = lengths[lengths.size() * 9 / 10];
+  // White noise of 0.4 to 20 steps stands still for 7.9 times its usual at most (88 times 12,000 rows). Of a log with
+  // three frozen stretches half of this masks the same.
+  constexpr double longer = 8;
   const double step = median(steps);
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (runs[r].readings < std::max(6.0, 8 * usual)) continue;
+    if (runs[r].readings < longer * usual) continue;
     // A coarse channel rests at one step for long when nothing happens. It was frozen only if it then jumps by several.
     const bool fine = usual <= 2;
     const bool jumps = r + 1 < runs.size() && steps[r] > 4 * step;
