@@ -145,8 +145,12 @@ void add_readings(Bins& out, const Log& log, Role role, double Bin::*value, floa
 /// White noise of one row's current, from stretches in which nothing turns and hardly anything flows; those in which it
 /// moves of itself do not count.
 double noise_at_rest_A(const Inputs& in) {
-  constexpr std::size_t rows = 20, least = 3;
-  constexpr double hardly = 0.25, still = 3;  // of the log's rms; of the middle one's square
+  constexpr std::size_t rows = 20, least = 3;  // of the stretches: a middle one of three has one beside itself to spare
+  // Of the log's rms, and more than its noise: where that was a fifth, at an eighth rest was not seen and a name became
+  // a tie, at a half the name stayed (one hidden log, speed_cooling).
+  constexpr double hardly = 0.25;
+  // Times the middle one's square: white noise is more in one stretch of 340 (of 100,000 drawn).
+  constexpr double still = 3;
   const double most2 = hardly * hardly * square(in.amplitude_A) / static_cast<double>(in.amplitude_A.size());
   std::vector<double> noise2;
   for (std::size_t from = 0; from + rows <= in.amplitude_A.size(); from += rows) {
@@ -193,7 +197,7 @@ double moved_towards_speed(Inputs& in, double noise_A) {
   for (std::size_t i = 0; i < in.amplitude_A.size(); ++i)
     apart2 += std::pow(in.amplitude_A[i] - by_speed.dot(powers(i)), 2) / static_cast<double>(in.amplitude_A.size());
   const double share = std::min(1.0, noise_A * noise_A / apart2);
-  if (share < 0.5) return 0;
+  if (share < 0.5) return 0;  // the current tells more than speed does
   for (std::size_t i = 0; i < in.amplitude_A.size(); ++i)
     in.amplitude_A[i] -= share * (in.amplitude_A[i] - by_speed.dot(powers(i)));
   return share;
@@ -223,8 +227,8 @@ void add_ahead(Bins& out, const Log& log, const Inputs& in) {
   }
 }
 
-/// Rows in which the bridge is on. A sensor's offset and noise at rest, four standard deviations of the current's or a
-/// hundredth of the most that is read, do not switch it on.
+/// Rows in which the bridge is on. A sensor's offset and noise at rest, four standard deviations of the current's (one
+/// row in 16,000 has more) or a hundredth of the most that is read, do not switch it on.
 std::vector<bool> enabled(const Inputs& in, double noise_A) {
   const auto least = [](const std::vector<double>& v) { return 0.01 * largest_magnitude(v); };
   const double least_A = std::max(4 * noise_A, least(in.amplitude_A));
@@ -275,8 +279,13 @@ void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in, dou
   }
 }
 
+/// What a housing's first readings are averaged over: five are noisy by less than half of one, and half a minute moves
+/// it little.
+constexpr double first_s = 30;
+constexpr int first_readings = 5;
+
 double first_reading(const Bins& log, double Bin::*reading, std::size_t from, std::size_t to, int most,
-                     double within_s = 30) {
+                     double within_s = first_s) {
   double sum = 0;
   int n = 0;
   for (std::size_t k = from; k < to && n < most && static_cast<double>(k - from) * log.width_s < within_s; ++k) {
@@ -298,7 +307,7 @@ void find_starts(Bins& out, const Log& log) {
     Start& start = out.starts[i];
     const std::size_t to = i + 1 < out.starts.size() ? out.starts[i + 1].bin : out.bins.size();
     start.core_degC = first_reading(out, &Bin::core_degC, start.bin, to, 1);
-    start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, 5);
+    start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, first_readings);
     // A coarse sensor says nothing before its first step, and no more than a step has passed until then.
     if (std::isnan(start.housing_degC))
       start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, 1, out.duration_s());
@@ -314,7 +323,8 @@ void find_idle(Bins& out) {
     most_heat = std::max(most_heat, heat(bin));
     most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
   }
-  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch; nor does its noise.
+  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch; nor does its noise, nor a
+  // fiftieth of the top speed: of what goes by its square that is less than a thousandth as well.
   const double least_heat = std::max(1e-3 * most_heat, 4 * out.current_noise_A * out.current_noise_A);
   for (Bin& bin : out.bins)
     bin.idle = heat(bin) <= least_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
