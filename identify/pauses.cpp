@@ -15,9 +15,10 @@ namespace {
 // Held over five seconds, a wrong current moves a small motor's winding (1 to 20 s) by kelvins. After ten minutes a
 // housing and what it is mounted on have moved as well.
 constexpr double pause_s = 5, long_s = 600, pause_rows = 5;
-constexpr std::size_t most_pauses = 24;  // each costs two initial temperatures
+constexpr std::size_t most_pauses = 24;  // each costs two initial temperatures, and a step the cube of them
 constexpr double most_share = 0.02;      // of the rows: more are a logger that writes now and then
-// Of a part, so that also what is held out of it leaves enough to be fitted.
+// Of a part, so that also what is held out of it leaves enough to be fitted: twice what is asked for there and more
+// (bins_of: 30 rows, too_poor: 20 readings).
 constexpr std::size_t least_rows = 100, least_readings = 40;
 
 /// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps,
