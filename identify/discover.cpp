@@ -347,6 +347,8 @@ std::vector<std::string> noise_words(const Problem& problem) {
 }  // namespace
 
 std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std::size_t which) {
+  // Half of the variance that was believed: the data then say as much as the prior does.
+  const double determined_share = 1 / std::sqrt(2.0);
   std::vector<ParameterLine> out;
   const Eigen::VectorXd sd = std::max(1.0, f.ratio()) * f.std_errors();
   Eigen::Index at = base_count;
@@ -363,7 +365,7 @@ std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& f, std
       const double of_fit = std::abs(slope) * sd[at];
       line.std_error = parameter.scale == Scale::duration ? of_fit : stated_error(line.value, of_fit);
       line.at_bound = f.at_bound[static_cast<std::size_t>(at)];
-      line.determined = !line.at_bound && sd[at] < 0.7 * parameter.typical;
+      line.determined = !line.at_bound && sd[at] < determined_share * parameter.typical;
       out.push_back(line);
     }
   }
