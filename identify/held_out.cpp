@@ -13,7 +13,6 @@ namespace identify {
 namespace {
 
 constexpr double block_s = 60;  // longer than a housing sensor's slow error (20 s), so that blocks are strangers
-constexpr double veto_share = 0.25;
 constexpr std::size_t least_blocks = 4;  // drawn from fewer, chance looks smaller than it is
 constexpr int least_draws = 100;         // for the 2.5th of a hundred to be one of them
 constexpr int veto_draws = 400;

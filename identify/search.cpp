@@ -33,12 +33,12 @@ double moved_K(const Problem& problem, const Fit& a, const Fit& b) {
   return std::sqrt(std::max(core, housing) / n);
 }
 
-/// The error on the last quarter of each log of a set fitted to the rest: of the winding where it is read.
+/// The error on what a veto is tried on, of each log, of a set fitted to the rest: of the winding where it is read.
 double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen, const Fit& warm) {
-  const Problem first = first_part(problem, 0.25);
+  const Problem first = first_part(problem, veto_share);
   const Fit f = fit(first, chosen, {&warm});
   if (!f.valid()) return 1e300;
-  const Rmse e = rmse_of(last_part(problem, 0.25), f);
+  const Rmse e = rmse_of(last_part(problem, veto_share), f);
   return std::isnan(e.core_K) ? e.housing_K : e.core_K;
 }
 

@@ -61,6 +61,9 @@ struct Margins {
   double disturbed_K = 0.06;
 };
 
+/// Of each log, what a veto is tried on: three quarters are left to show every kind of load.
+inline constexpr double veto_share = 0.25;
+
 enum class Verdict { adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient };
 const char* word(Verdict verdict);
 /// Of the whole or of most of it.
