@@ -11,6 +11,8 @@ namespace identify {
 namespace {
 
 constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
+// Far beyond what a first reading is wrong by, and what a winding of class F can be above its housing.
+constexpr double initial_room_K = 60, most_excess_K = 150;
 // Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
 // catalogues is 0.03 to 1.4.
 constexpr double warm_excess_share = 0.5;
@@ -51,11 +53,11 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
       const double at = std::isnan(housing) ? core : housing;
       const double sink = log.bins[std::min(start.bin, log.bins.size() - 1)].input.boundary_degC[0];
       const double known = std::isnan(at) ? sink : at;
-      out.push_back({known, known, initial_sd_K, known - 60, known + 60});
+      out.push_back({known, known, initial_sd_K, known - initial_room_K, known + initial_room_K});
       const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
       const double excess_sd_K =
           std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
-      out.push_back({excess, excess, initial_sd_K + excess_sd_K, -60, 150});
+      out.push_back({excess, excess, initial_sd_K + excess_sd_K, -initial_room_K, most_excess_K});
     }
   }
   return out;
