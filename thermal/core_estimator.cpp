@@ -19,9 +19,11 @@ constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
 constexpr int window_steps = 50;     // the housing is heard twice a second: faster only averages its noise
 constexpr int missing_steps = 10;    // 100 ms without a reading: safety table, NTC open or short
 constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
-constexpr float suspicious_pull_K = 1.0f;
-constexpr float least_gate_K = 5.0f;
-constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;
+constexpr float suspicious_pull_K = 1.0f;  // lowered by less, a stuck sensor does little harm: chosen
+constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
+constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
+constexpr float unheard_sigma_K = 3.0f;  // that housing and ambient are less known by, once nothing tells them; chosen
+constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;  // as slowly as an ambient drifts (below)
 constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
 constexpr float enough_movement_K = 3.0f, alive_share = 0.5f, stuck_share = 0.25f;
 constexpr float start_sigma_K = 15.0f;
@@ -202,8 +204,8 @@ void CoreEstimator::hear_housing(Reading housing) {
     if (silent_ < missing_steps) ++silent_;
     if (silent_ == missing_steps && !(flags_ & housing_missing)) {
       flags_ |= housing_missing;
-      p_(housing_.node, housing_.node) += squared(3.0f);
-      p_(ambient(), ambient()) += squared(3.0f);
+      p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
+      p_(ambient(), ambient()) += squared(unheard_sigma_K);
     }
     window_ = heard_ = 0;
     reading_sum_ = sensor_sum_ = 0.0;
@@ -243,7 +245,7 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + noise);
-  const float gate_K = 4.0f * sigma_K > least_gate_K ? 4.0f * sigma_K : least_gate_K;
+  const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
   // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
   const float expected_K = std::abs(model_moved_K_);
   const float moved_K = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
@@ -272,8 +274,8 @@ void CoreEstimator::disbelieve_housing() {
     const float ambient_K = static_cast<float>(trusted_ambient_degC_ - ambient_degC_);
     due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
     due_steps_ = window_steps;
-    p_(housing_.node, housing_.node) += squared(3.0f);
-    p_(ambient(), ambient()) += squared(3.0f);
+    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
+    p_(ambient(), ambient()) += squared(unheard_sigma_K);
   }
   flags_ |= housing_contradicts;
 }
@@ -352,7 +354,7 @@ bool CoreEstimator::hear_winding(float seen_degC, float sigma_K) {
   if (windings == 0) return false;
   Row seen = Row::Zero(n_ + 5);
   for (int i = 0; i < n_; ++i) seen[i] = std::isfinite(max_degC_[i]) ? 1.0f / static_cast<float>(windings) : 0.0f;
-  const float gate_K = 4.0f * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(sigma_K));
+  const float gate_K = gate_sigmas * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(sigma_K));
   const float innovation_K = seen_degC - static_cast<float>(sum_degC / windings);
   if (!(innovation_K > -gate_K)) return false;
   // Hotter than believable still counts, but one reading is only one.
