@@ -25,6 +25,8 @@ struct Step {
   double on = 0, off = 0;
 };
 
+/// All assumed: shares of time, loads and speeds that a legged robot's axis might see; bursts up to 4.5 times the
+/// rating.
 Stretch next_of_robot(Random& random) {
   const double kind = random.uniform(), sign = random.uniform() < 0.5 ? -1 : 1;
   if (kind < 0.45) {  // walking: the more load the more speed
