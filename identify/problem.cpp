@@ -70,7 +70,10 @@ AtRest at_rest(const Bins& fine, double lag_s) {
   return out;
 }
 
-/// White and slow part of the housing noise: of one reading from its differences, the rest from rest.
+/// White and slow part of the housing noise: of one reading from its differences, the rest from rest. What is assumed
+/// here matters where the noise decides: half of usual_slow_K, of after_load_s, of the least white, of the five minutes
+/// and of a winding's 2 K at once named one effect of 1.3 K more, of 20 logs, and lost one of 3.6 K to "unknown" (those
+/// of candidates.cpp).
 void noise_from_rest(Problem& problem) {
   // Over eight seconds what is white is little beside what is slow; over two it is much.
   constexpr double lag_s = 8, short_s = 2;
