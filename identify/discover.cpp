@@ -102,7 +102,11 @@ std::string in_words(const Search& found, const std::vector<std::string>& ids) {
 
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
-  const bool core = !std::isnan(e.core_K);
+  // Readings of the winding may be too noisy to show what the housing's do.
+  constexpr double visible = 1.1;
+  const bool hides = (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) && !std::isnan(e.housing_K) &&
+                     e.core_K < visible * r.extended_rmse.core_K;
+  const bool core = !std::isnan(e.core_K) && !hides;
   const Noise& n = found.noise;
   const double noise_K =
       core ? std::hypot(n.core_white_K, n.core_slow_K) : std::hypot(n.housing_white_K, n.housing_slow_K);

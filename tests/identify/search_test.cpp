@@ -662,6 +662,14 @@ TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
   says(report.notes.back(), "What would tell whether it is radiation");
 }
 
+TEST(Report, WhatAWindingTooNoisyHidesIsToldOfTheHousing) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto report = report_of({.seed = 770395, .effects = {"bridge_loss"}});
+  ASSERT_EQ(report.verdict, "explained");
+  EXPECT_GT(report.extended_rmse.core_K, 0.95 * report.baseline_rmse.core_K);
+  says(report.sentence, "the two-resistor model misses the housing");
+}
+
 TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
