@@ -254,6 +254,7 @@ void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& fi
   base.fit = field.base.fit.valid() ? fit(problem, {}, {&field.base.fit}) : fit(problem, {});
   base.ratio = base.fit.ratio();
   field.base = std::move(base);
+  if (!field.base.fit.valid()) return field.singles.clear();
   field.singles = singles_of(problem, all, field.base, field.singles);
 }
 

@@ -158,23 +158,20 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 
 /// Of two clocks farther apart than a clock_delay may be: by how much the temperatures are late; 0: by none. Until they
 /// are put right, a motor that warms where nothing flows makes rest look noisy.
-double clocks_apart_s(const Problem& problem, const Fit& best, const std::vector<Log>& logs,
-                      const std::optional<wire::pc::MotorFile>& motor) {
+double clocks_apart_s(const Problem& problem, const Fit& best, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  double late_s = 0, least = 1e300;
+  const double by_one = excess(fit(problem, best.chosen, {&best})), by_none = excess(fit(problem, {}));
+  double late_s = 0, least = std::min(by_one - clearly, fraction_left * by_none);
   for (const double tried_s : {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s}) {
     const bool room = std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
       return log.of(Role::time).back() > 4 * std::abs(tried_s) && log.resumes_s.empty();
     });
     if (!room) continue;
-    const Problem apart = problem_of(loaded_later(tried_s, problem, logs), motor);
-    Problem together = problem;
-    together.noise = apart.noise;
+    const Problem apart = unseen_by(problem, loaded_later(tried_s, problem, logs));
     const Fit f = fit(apart, {clock});
     const double left = excess(f);
-    if (left < least && left + clearly < excess(fit(together, best.chosen, {&best})) &&
-        left < fraction_left * excess(fit(together, {}))) {
+    if (left < least) {
       least = left;
       late_s = tried_s + f.x[coordinate_of(f, Edit::delay)];
     }
@@ -331,7 +328,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
-  if (const double late_s = clocks_apart_s(problem, best, logs, motor); late_s != 0)
+  if (const double late_s = clocks_apart_s(problem, best, logs); late_s != 0)
     return fmt::format("The temperatures follow the current {:.0f} s {}: two clocks; align the recordings first.",
                        std::abs(late_s), late_s > 0 ? "late" : "early");
   const int delay = coordinate_of(best, Edit::delay);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "identify/baseline.hpp"
+#include "identify/candidates.hpp"
 #include "identify/leeway.hpp"
 #include "identify/replay.hpp"
 #include "identify/structure.hpp"
@@ -381,6 +382,12 @@ TEST(Fit, AnUnknownMotorIsFoundFromTheDataAlone) {
   EXPECT_NEAR(f.x[0], std::log(1.08 * 1.5 * 0.75), 0.35);
   EXPECT_NEAR(f.x[1], std::log(16.3 * 0.7 * 0.75), 0.15);
   EXPECT_NEAR(f.x[3], std::log(18.0 * 1.4 / 0.75), 0.25);
+}
+
+TEST(Fit, OfAMotorThatCannotBeSimulatedNoCauseIsTried) {
+  auto problem = identify::problem_of(tests::bench_logs({{}}), tests::ec_16());
+  problem.belief.C1_J_per_K = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(identify::best_alone(problem).valid());
 }
 
 TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
