@@ -37,6 +37,36 @@ std::string whole_file(const std::string& path) {
   return text;
 }
 
+bool is_utf8(std::string_view text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const auto first = static_cast<unsigned char>(text[at]);
+    const std::size_t length = first < 0x80                    ? 1
+                               : first >= 0xC2 && first < 0xE0 ? 2
+                               : first >= 0xE0 && first < 0xF0 ? 3
+                               : first >= 0xF0 && first < 0xF5 ? 4
+                                                               : 0;
+    const std::string_view more = text.substr(at + 1, length - 1);
+    if (length == 0 || more.size() + 1 < length) return false;
+    if (std::any_of(more.begin(), more.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }))
+      return false;
+    at += length;
+  }
+  return true;
+}
+
+/// Spreadsheets write the degree sign of a header so in much of Europe.
+std::string from_latin_1(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code < 0x80)
+      out += c;
+    else
+      out += {static_cast<char>(0xC0 | code >> 6), static_cast<char>(0x80 | (code & 0x3F))};
+  }
+  return out;
+}
+
 /// Cells of one line. Returns false when a quote is never closed, or something follows it in its cell.
 bool split(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
@@ -288,13 +318,14 @@ int Table::find(const std::string& name) const {
 }
 
 Table read_table(const std::string& path) {
-  const std::string text = whole_file(path);
+  std::string text = whole_file(path);
   Table table;
   table.file = path;
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
+  if (!is_utf8(text)) text = from_latin_1(text);
   std::string_view rest = text;
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
-  if (rest.starts_with("\xFF\xFE") || rest.starts_with("\xFE\xFF"))
-    refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
   if (is_json(rest)) {
     refuse(table, 1,
            "this is JSON; write it as CSV: a line of column names (such as time_s,current_A,housing_degC), then one "

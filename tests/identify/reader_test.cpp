@@ -91,6 +91,16 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n"), "unknown unit 'Arms'");
 }
 
+TEST(Reader, DegreesInLatin1AreDegrees) {
+  ColumnMap map;
+  add_column(map, "housing_degC=Gehäuse [°F]");
+  const auto logs = read(
+      "time_s;current_A;Geh\xE4use [\xB0"
+      "F]\n0;1;50\n1;2;212\n",
+      map);
+  EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
+}
+
 TEST(Reader, AUnitInAMappedColumnsNameIsObeyedUnlessOneWasSaid) {
   const std::string rows = "\n0,1000,50,60\n1500,2000,212,60\n";
   const std::string text = "Time (ms),Current [mA],T_body degF,n (rpm)" + rows;
