@@ -536,6 +536,7 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
   EXPECT_EQ(factor("time_s", "ns"), 1e-9);
   for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
+  for (const char* mohm : {"mohm", "mΩ", "mΩ"}) EXPECT_EQ(factor("winding_ohm", mohm), 1e-3);
   for (const char* degC : {"Deg C", "degC", "deg c", "Celsius", "celsius", "ºC", "°C", "C"})
     EXPECT_EQ(factor("housing_degC", degC), 1);
   for (const char* degF : {"Deg F", "DEGF", "Fahrenheit", "ºF", "°F", "F"})
