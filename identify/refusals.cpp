@@ -137,10 +137,11 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
 }
 
 /// The same logs with the load so many seconds later, or sooner where that is negative, without the rows that then have
-/// none or nothing else.
+/// none or nothing else. None where that would leave less than three quarters of a log, or a pause stands in it.
 std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs) {
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto rows = static_cast<std::ptrdiff_t>(std::abs(late_s) / problem.logs[l].interval_s);
+    if (4 * rows > std::ssize(logs[l].of(Role::time)) || !logs[l].resumes_s.empty()) return {};
     for (std::size_t role = 0; role < role_count; ++role) {
       std::vector<double>& column = logs[l].columns[role];
       if (column.empty()) continue;
@@ -158,18 +159,16 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 
 /// Of two clocks farther apart than a clock_delay may be: by how much the temperatures are late; 0: by none. Until they
 /// are put right, a motor that warms where nothing flows makes rest look noisy.
-double clocks_apart_s(const Problem& problem, const Fit& best, const std::vector<Log>& logs) {
+double clocks_apart_s(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  const double by_one = excess(fit(problem, best.chosen, {&best})), by_none = excess(fit(problem, {}));
-  double late_s = 0, least = std::min(by_one - clearly, fraction_left * by_none);
+  double late_s = 0, least = fraction_left * excess(fit(problem, {}));
+  for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
+    least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
   for (const double tried_s : {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s}) {
-    const bool room = std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
-      return log.of(Role::time).back() > 4 * std::abs(tried_s) && log.resumes_s.empty();
-    });
-    if (!room) continue;
-    const Problem apart = unseen_by(problem, loaded_later(tried_s, problem, logs));
-    const Fit f = fit(apart, {clock});
+    const std::vector<Log> apart = loaded_later(tried_s, problem, logs);
+    if (apart.empty()) continue;
+    const Fit f = fit(unseen_by(problem, apart), {clock});
     const double left = excess(f);
     if (left < least) {
       least = left;
@@ -328,7 +327,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
-  if (const double late_s = clocks_apart_s(problem, best, logs); late_s != 0)
+  if (const double late_s = clocks_apart_s(problem, found, logs); late_s != 0)
     return fmt::format("The temperatures follow the current {:.0f} s {}: two clocks; align the recordings first.",
                        std::abs(late_s), late_s > 0 ? "late" : "early");
   const int delay = coordinate_of(best, Edit::delay);
