@@ -249,6 +249,7 @@ TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
 }
 
 TEST(Report, LogsOfOneNameAreToldApartByTheirFolders) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.seconds = 120;
   auto logs = tests::bench_logs({options, options, options});
@@ -456,6 +457,7 @@ TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
 
 /// As an inverter's logger averages: what flowed in the five seconds before a row, beside a winding of 50 s.
 TEST(Report, ARowsLoadMayBeWhatFlowedBeforeIt) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.motor = {.ohm = 0.75, .R1 = 1.0, .R2 = 4.0, .C1 = 50, .C2 = 300};
   options.rate_Hz = 0.2;
@@ -481,6 +483,7 @@ tests::BenchOptions fast_winding() {
 }
 
 TEST(Report, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options = fast_winding();
   options.sensor_share = 0.15;
   options.rate_Hz = 1;
@@ -491,6 +494,7 @@ TEST(Report, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
 }
 
 TEST(Report, RowsMayBeBehindWhereASensorIsToo) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options = fast_winding();
   options.sensor_share = 0.15;
   options.rate_Hz = 0.5;
