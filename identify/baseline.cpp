@@ -190,7 +190,7 @@ void judge_baseline(const Problem& problem, const Fit& f, double judged_ratio, c
     inflated.sd *= inflation;
     report.loose.push_back(in_words(inflated));
   }
-  // Of right models one in a hundred leaves more where 20 minutes of rest have shown the noise (simulated logs).
+  // A right model leaves 1; the noise that is believed may be too small by some. Chosen.
   constexpr double noise_alone = 1.3;
   const double left = report.structure.residual.ratio;
   const auto right = [](double ratio) { return ratio < noise_alone; };

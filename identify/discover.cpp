@@ -68,8 +68,8 @@ void tell(const Problem& problem, const Search& found, Report& report) {
   report.ladder = ladder_of(found);
   if (found.doubted) {
     for (const Chosen& chosen : found.sets.front().fit.chosen)
-      report.notes.push_back(
-          fmt::format("What would tell whether it is {}: {}.", cause_of(chosen).name, cause_of(chosen).experiment));
+      report.notes.push_back(fmt::format("What would tell whether it is {}: {}.", names_of({chosen}).front(),
+                                         cause_of(chosen).experiment));
   }
   if (!names_causes(found.verdict) && found.verdict != Verdict::ambiguous) return;
   const Fit& f = found.chosen.fit;
@@ -103,7 +103,7 @@ std::string in_words(const Search& found, const std::vector<std::string>& ids) {
 std::string sentence(const Search& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   // Readings of the winding may be too noisy to show what the housing's do.
-  constexpr double visible = 1.1;
+  constexpr double visible = 1.1;  // by a tenth
   const bool hides = (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) && !std::isnan(e.housing_K) &&
                      e.core_K < visible * r.extended_rmse.core_K;
   const bool core = !std::isnan(e.core_K) && !hides;

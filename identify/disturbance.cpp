@@ -139,6 +139,7 @@ bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {
 
 Problem believed_less(Problem problem, const Fit& f, double times) {
   const int at = coordinate_of(f, Edit::sensor_share);
+  // A sensor that feels a tenth of the winding sees a tenth of how uneven that is.
   const Unmodelled felt{at < 0 ? 0 : of_a_winding.share * f.x[at], of_a_winding.over_s};
   const Unmodelled& unmodelled = felt.share > of_a_housing.share ? felt : of_a_housing;
   const double unmodelled_K = times * unmodelled.share * housing_range_K(problem);

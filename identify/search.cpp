@@ -98,8 +98,10 @@ void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vecto
   const auto best = [&]() -> const Fit& {
     return field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
   };
-  if (field.singles.front().gain > margins.detect)
-    problem.leeway = ordinary_leeway(problem, ordinary = field.singles.front().fit);
+  if (field.singles.front().gain > margins.detect) {
+    ordinary = field.singles.front().fit;
+    problem.leeway = ordinary_leeway(problem, ordinary);
+  }
   const bool sparse_core = problem.any_core() && problem.noise.core_slow_K == 0;
   refine_housing_noise(problem, best());
   if (sparse_core) {
