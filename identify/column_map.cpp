@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "identify/log.hpp"
@@ -26,13 +27,19 @@ ColumnMap read_map(const std::string& path) {
                                              error.description()));
   }
   for (const auto& [key, unused] : file) {
-    if (key.str() != "columns" && key.str() != "note") {
-      throw UserError(Exit::usage, fmt::format("{}: unknown key '{}'{} (a map holds [columns] and note).", path,
-                                               key.str(), wire::pc::did_you_mean(key.str(), {"columns", "note"})));
+    if (key.str() != "columns" && key.str() != "note" && key.str() != "period_s") {
+      throw UserError(Exit::usage,
+                      fmt::format("{}: unknown key '{}'{} (a map holds [columns], note and period_s).", path, key.str(),
+                                  wire::pc::did_you_mean(key.str(), {"columns", "note", "period_s"})));
     }
   }
   ColumnMap map;
   map.note = file["note"].value_or(std::string());
+  if (file.contains("period_s")) {
+    map.period_s = file["period_s"].value_or(missing);
+    if (!(map.period_s > 0) || std::isinf(map.period_s))
+      throw UserError(Exit::usage, path + ": period_s: write the seconds from row to row, such as 0.5.");
+  }
   const toml::table* columns = file["columns"].as_table();
   if (columns == nullptr)
     throw UserError(Exit::usage, path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");

@@ -390,6 +390,21 @@ void note_unused(Log& log) {
     log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
 }
 
+/// The rows of each session; one without a name where none are told apart.
+using Sessions = std::map<double, std::vector<std::size_t>>;
+
+/// A column of the time since the first row of a session, of rows that are a period apart.
+Source give_clock(Table& table, const Sessions& sessions, double period_s) {
+  std::vector<double> time_s(table.rows(), missing);
+  for (const auto& [key, rows] : sessions) {
+    for (std::size_t i = 0; i < rows.size(); ++i) time_s[rows[i]] = static_cast<double>(i) * period_s;
+  }
+  table.names.push_back("--period");
+  table.columns.push_back(std::move(time_s));
+  table.of_day.push_back(false);
+  return {table.names.back()};
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name) {
   Log log;
@@ -517,22 +532,27 @@ Log loaded_before(Log log) {
   return log;
 }
 
-std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
+std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
   std::vector<std::string> unit_notes;
-  const auto found = resolve(table, map, unit_notes);
+  auto found = resolve(table, map, unit_notes);
   const auto need = [&](bool there, const std::string& what, const std::string& hint) {
     if (!there)
       refuse(fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
                          fmt::join(table.names, ", ")));
   };
   const auto has = [&](Role r) { return found.contains(r); };
-  need(has(Role::time), "a time column", "call it time_s or say --column time_s=NAME");
+  const bool by_row = !std::isnan(map.period_s);
+  if (by_row && has(Role::time))
+    throw UserError(Exit::usage, fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.",
+                                             table.file, found.at(Role::time).column));
+  need(by_row || has(Role::time), "a time column",
+       "call it time_s, say --column time_s=NAME, or --period S where the rows are S seconds apart");
   need(has(Role::current) || has(Role::iq) || has(Role::power), "the heat input (current_A, iq_A or power_W)",
        "map it with --column current_A=NAME");
   need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)",
        "map it with --column housing_degC=NAME");
 
-  std::map<double, std::vector<std::size_t>> sessions;
+  Sessions sessions;
   std::size_t in_a_session = 0;
   const std::vector<double>* session =
       has(Role::session) ? &table.columns[index_of(table, found.at(Role::session))] : nullptr;
@@ -543,6 +563,7 @@ std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::op
   if (sessions.empty())
     refuse(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
                        table.file, found.at(Role::session).column));
+  if (by_row) found[Role::time] = give_clock(table, sessions, map.period_s);
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
     Log whole = one_log(table, found, rows,

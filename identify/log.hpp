@@ -64,10 +64,12 @@ struct Source {
 /// Which column plays which role, and how its unit becomes ours.
 struct ColumnMap {
   std::map<Role, Source> columns;
-  std::string note;  // what a person should know of these logs, printed in the report
+  double period_s = missing;  // from row to row of logs without a clock
+  std::string note;           // what a person should know of these logs, printed in the report
 };
 
-/// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and an optional note.
+/// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and, where wanted, a
+/// note and period_s.
 ColumnMap read_map(const std::string& path);
 
 /// Adds "role=column" or "role=column:unit" to a map; `from`: where it was said, for complaints.
@@ -122,7 +124,8 @@ std::vector<double> a_row_sooner(std::vector<double> column);
 /// The same, each row's load taken for what flowed since the row before it; a note says so.
 Log loaded_before(Log log);
 
-/// The logs in a table: one, or one a session. Throws UserError (unusable) in one sentence.
-std::vector<Log> logs_of(const Table& table, const ColumnMap& map, const std::optional<wire::Motor>& motor);
+/// The logs in a table: one, or one a session. Throws UserError (unusable; usage of a map that does not fit) in one
+/// sentence.
+std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<wire::Motor>& motor);
 
 }  // namespace identify

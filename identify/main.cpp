@@ -30,6 +30,7 @@ Examples
   identify run1.csv run3.csv --hold-out fan.csv           fit two logs, score on a third
   identify bench.csv --map identify/maps/paderborn.toml --html report.html
   identify bench.csv --column housing_degC=T_case:degF --json -
+  identify measures.csv --period 0.5 --column session=profile_id     no time column; many logs
   identify walk.csv --motor ec-16-40w --explain           how the answer was found as well
   identify walk.csv --motor ec-16-40w --write-model model.toml     what a board should run
   identify a.csv b.csv --score a.json b.json              how often right, where truths are known
@@ -38,6 +39,7 @@ Examples
 struct Arguments {
   std::vector<std::string> logs, columns, truths;
   std::string motor, map, hold_out, json, html, write_model, write_baseline;
+  std::optional<double> period_s;
   bool explain = false;
   int draws = identify::HoldOut{}.draws;
 };
@@ -190,6 +192,7 @@ int answer(Arguments a) {
   identify::ColumnMap said;
   for (const std::string& column : a.columns) identify::add_column(said, column);
   for (const auto& [role, source] : said.columns) map.columns[role] = source;
+  if (a.period_s) map.period_s = *a.period_s;
   if (!a.truths.empty()) return score(a, map, motor);
   std::optional<identify::Doing> doing(std::in_place);
   (*doing)("reading");
@@ -233,11 +236,15 @@ int main(int argc, char** argv) {
          "motor file (.toml), or the name of one in boards/motors (or in the folder that HOTCORE_MOTORS names); "
          "without it the answer is less certain")
       ->type_name("MOTOR");
-  app.add_option("--map", a.map, "TOML file that says which column is what")->type_name("FILE");
+  app.add_option("--map", a.map, "TOML file that says which column is what, and the period of rows without a time")
+      ->type_name("FILE");
   app.add_option("--column", a.columns,
                  "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated; see below)")
       ->allow_extra_args(false)
       ->type_name("ROLE=NAME");
+  app.add_option("--period", a.period_s, "seconds from row to row, of logs without a time column")
+      ->check(CLI::Range(1e-6, 86400.0))
+      ->type_name("S");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,
                  "a log, or the last part of each log as a fraction (0.25 or 25%), that is scored and not fitted")

@@ -56,6 +56,19 @@ TEST(Reader, OwnColumnNamesNeedNoMap) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21);
 }
 
+TEST(Reader, RowsWithoutATimeFollowEachOtherByThePeriodThatIsSaidInEachSession) {
+  ColumnMap map;
+  map.period_s = 0.5;
+  const std::string rows = "current_A,housing_degC,session\n1,20,7\n1,20,7\n2,30,8\n2,31,8\n2,32,8\n";
+  const auto logs = read(rows, map);
+  ASSERT_EQ(logs.size(), 2u);
+  EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 0.5}));
+  EXPECT_EQ(logs[1].of(Role::time), (std::vector<double>{0, 0.5, 1}));
+  EXPECT_EQ(logs[1].of(Role::housing), (std::vector<double>{30, 31, 32}));
+  says(complaint(rows), "--period S");
+  says(complaint(head + "0,1,20\n1,1,20\n", map, 2), "its column 'time_s' tells the time");
+}
+
 TEST(Reader, SemicolonsDecimalCommasQuotesCrlfAndByteOrderMarkAreUnderstood) {
   const auto logs =
       read("\xEF\xBB\xBF# logger 3\r\n\"time_s\";\"current_A\";housing_degC\r\n0;1,5;20,25\r\n0,5;-2;\"21,5\"\r\n");
