@@ -30,9 +30,8 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   options.seconds = seconds;
   options.rate_Hz = rate_Hz;
   options.core_every_s = core_every_s;
-  const auto motor = wire::pc::read_motor("ec-powermax-30-24v", HOTCORE_SOURCE_DIR "/boards/motors");
-  options.extra_housing_W = [](double, double, double) { return 3.0; };
-  options.motor = {1.5 * motor.motor.phase_resistance_ohm, 0.00393, 0.18, 6.0, 12.0, 190.0};
+  const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
+  options.extra_housing_W = [](double, double, double) { return 1.0; };
   const auto table = identify::read_table(tests::write_bench_log("hotcore_speed.csv", options));
   const double t0 = now_ms();
   const auto logs = identify::logs_of(table, {}, motor.motor);
