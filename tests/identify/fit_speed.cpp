@@ -31,7 +31,7 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
   options.rate_Hz = rate_Hz;
   options.core_every_s = core_every_s;
   const auto motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors");
-  options.extra_housing_W = [](double, double, double) { return 1.0; };
+  options.extra_housing_W = [](double, double, double) { return 0.3; };
   const auto table = identify::read_table(tests::write_bench_log("hotcore_speed.csv", options));
   const double t0 = now_ms();
   const auto logs = identify::logs_of(table, {}, motor.motor);
