@@ -30,7 +30,7 @@ Examples
   identify run1.csv run3.csv --hold-out fan.csv           fit two logs, score on a third
   identify bench.csv --map identify/maps/paderborn.toml --html report.html
   identify bench.csv --column housing_degC=T_case:degF --json -
-  identify measures.csv --period 0.5 --column session=profile_id     no time column; many logs
+  identify measures.csv --map identify/maps/paderborn_sessions.toml      no time column; many logs
   identify walk.csv --motor ec-16-40w --explain           how the answer was found as well
   identify walk.csv --motor ec-16-40w --write-model model.toml     what a board should run
   identify a.csv b.csv --score a.json b.json              how often right, where truths are known

@@ -56,6 +56,24 @@ TEST(Reader, OwnColumnNamesNeedNoMap) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21);
 }
 
+TEST(Map, EachThatComesAlongIsReadAndTheOneOfSessionsTellsThePeriod) {
+  int read = 0;
+  for (const auto& map : std::filesystem::directory_iterator(HOTCORE_SOURCE_DIR "/identify/maps")) {
+    EXPECT_FALSE(identify::read_map(map.path()).columns.empty()) << map.path();
+    ++read;
+  }
+  EXPECT_GE(read, 3);
+  EXPECT_EQ(identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/paderborn_sessions.toml").period_s, 0.5);
+  const std::string path = (std::filesystem::temp_directory_path() / "period.toml").string();
+  std::ofstream(path) << "period_s = -1\n[columns]\nhousing_degC = \"T\"\n";
+  try {
+    identify::read_map(path);
+    ADD_FAILURE() << "a period of -1 s was read";
+  } catch (const UserError& error) {
+    says(error.what(), "seconds from row to row");
+  }
+}
+
 TEST(Reader, RowsWithoutATimeFollowEachOtherByThePeriodThatIsSaidInEachSession) {
   ColumnMap map;
   map.period_s = 0.5;
