@@ -79,6 +79,13 @@ struct Dual {
     for (int i = 0; i < pairs; ++i) a.d[i] = -a.d[i];
     return a;
   }
+  /// Is it this constant, whatever the parameters?
+  friend bool operator==(const Dual& a, double constant) {
+    for (int i = 0; i < 2 * pairs; ++i) {
+      if (a.slope(i) != 0) return false;
+    }
+    return a.v == constant;
+  }
   friend bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
   friend bool operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
 

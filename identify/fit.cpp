@@ -98,7 +98,7 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
 
 template <int N>
 struct Sums {
-  Dual<N> H[N] = {};  // rows of products of sensitivities; values: with the residual
+  Dual<N> H[N] = {};  // rows of products of sensitivities, to the diagonal's pair; values: with the residual
   double misfit = 0;
   int readings = 0;
   Dual<N> with_averaged[Averaged::most] = {};  // products of residual and sensitivities with what is averaged over
@@ -124,7 +124,10 @@ void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& sim
     if (disturbed) predicted.disturbance += e * (w.gain_disturbed / w.weight);
     sums.misfit += 0.5 * e.v * e.v;
     ++sums.readings;
-    for (int i = 0; i < N; ++i) sums.H[i] += e * e.slope(i);
+    for (int i = 0; i < N; ++i) {
+      sums.H[i].v += e.v * e.slope(i);
+      for (int pair = 0; pair <= i / 2; ++pair) sums.H[i].d[pair] += e.d[pair] * e.slope(i);
+    }
     for (std::size_t i = 0; i < averaged.effects.size(); ++i)
       sums.with_averaged[i] += e * (averaged.effects[i].*channel)[l][k];
   }
@@ -190,8 +193,9 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
     bool finite = true;
     // A further node brings two coordinates.
     constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
-    replay<most_nodes>(model, log, initial, [&](std::size_t k, const Dual<N>& y2, const Dual<N>& y1) {
+    replay<most_nodes>(model, log, initial, [&](std::size_t k, const Dual<N>& y2, const auto& winding) {
       const Bin& bin = log.bins[k];
+      const Dual<N> y1 = bin.core_n > 0 ? winding() : Dual<N>(0);
       while (begun < log.starts.size() && k == log.starts[begun].bin) {
         take_sums();
         for (Predicted<N>* p : {&of_housing, &of_core}) {
@@ -612,8 +616,9 @@ Replayed replayed(const Problem& problem, const Fit& f, std::size_t l) {
   Whitener white =
       log.has_housing ? Whitener::housing(problem.noise, log.width_s) : Whitener::core(problem.noise, log.width_s);
   double wander = 0, disturbance = 0;
-  replay<4>(model, log, initial_states(problem, f, l), [&](std::size_t k, double y2, double y1) {
+  replay<4>(model, log, initial_states(problem, f, l), [&](std::size_t k, double y2, const auto& winding) {
     const Bin& bin = log.bins[k];
+    const double y1 = winding();
     out.housing_degC.push_back(y2);
     out.core_degC.push_back(y1);
     out.housing_residual_K.push_back(bin.housing_degC - y2);
@@ -644,7 +649,8 @@ double hottest_degC(const Problem& problem, const Fit& f, std::size_t l) {
   for (const int node : {part.core, hot}) {
     if (node < 0) continue;
     part.core = node;
-    replay<4>(part, log, initial, [&](std::size_t, double, double degC) { hottest = std::max(hottest, degC); });
+    replay<4>(part, log, initial,
+              [&](std::size_t, double, const auto& winding) { hottest = std::max(hottest, winding()); });
   }
   return hottest;
 }

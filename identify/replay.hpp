@@ -157,6 +157,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   Vector T = Vector::Constant(initial.front().housing_degC), next;
   const int housing = set.housing.node;
   const bool lags = value_of(set.housing.lag_s) > 0;
+  const bool reads_straight = set.housing.gain_error == 0 && set.housing.offset_K == 0;
   S lagged(0), keep(0), mean_keep(0), left(0);
   std::size_t begun = 0;
   // After a pause a further mass goes on from where it is; that this depends on the earlier start is left out.
@@ -220,15 +221,18 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
       seen += off * (bin.housing_n > 1 ? mean_keep : exp(-into_s / set.housing.lag_s));
       lagged = before + change - behind + off * keep;
     }
-    seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);
+    if (!reads_straight) seen += set.housing.offset_K + set.housing.gain_error * (seen - 25.0);
     const auto read = [&](int node, const S& K_per_ahead) {
       S degC = T[node] + (next[node] - T[node]) * static_cast<double>(bin.core_at);
       if (bin.core_n > 0) degC += ran_ahead(node, K_per_ahead, bin.core_ahead);
       return degC;
     };
-    S core = read(model.core, core_K);
-    if (model.hot_node >= 0) core = core * (1 - model.hot_share) + read(model.hot_node, hot_K) * model.hot_share;
-    visit(k, seen, core);
+    const auto winding = [&] {
+      S core = read(model.core, core_K);
+      if (model.hot_node >= 0) core = core * (1 - model.hot_share) + read(model.hot_node, hot_K) * model.hot_share;
+      return core;
+    };
+    visit(k, seen, winding);
     T = next;
   }
 }
@@ -248,8 +252,8 @@ void prepare_and_run(const Model<S>& model, const Bins& log, const std::vector<I
 
 }  // namespace replay_detail
 
-/// Replays `log` from one state for each of its starts; `visit(bin, housing reading, core reading)`. `most_nodes`: what
-/// the model may have at most, so that no more is compiled than can happen.
+/// Replays `log` from one state for each of its starts; `visit(bin, housing reading, winding)`, where winding() is the
+/// core reading. `most_nodes`: what the model may have at most, so that no more is compiled than can happen.
 template <int most_nodes, class S, class Visit>
 void replay(const Model<S>& model, const Bins& log, const std::vector<Initial<S>>& initial, Visit&& visit) {
   if (model.set.node_count == 2) return replay_detail::prepare_and_run<2>(model, log, initial, visit);

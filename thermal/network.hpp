@@ -84,6 +84,7 @@ class HeatNetwork {
       const Scalar gain = s.gain / capacity_J_per_K_[s.node];
       const Scalar slope = gain * s.coefficient_per_K;
       sources_[source_count_++] = {s.node, static_cast<int>(s.drive), gain - slope * 25.0, slope};
+      if (!(s.coefficient_per_K == 0)) note_sloped(s.node);
     }
   }
 
@@ -103,16 +104,20 @@ class HeatNetwork {
   Vector step(const Transition<Scalar, N>& t, const Vector& degC, const HeatInput<Data>& input) const {
     Vector base = Vector::Zero(n_), slope = Vector::Zero(n_);  // s = base + slope * T (+ curved laws)
     gather(input, base, slope);
-    Vector s = base + slope.cwiseProduct(degC);
+    Vector s = base;
+    for (int k = 0; k < sloped_count_; ++k) s[sloped_[k]] += slope[sloped_[k]] * degC[sloped_[k]];
     if (curved_count_ > 0) add_curved(degC, input, s);
     const Vector a = t.phi0.lazyProduct(degC) + t.phi1.lazyProduct(s);
-    Vector change = slope.cwiseProduct(a - degC);
     if (curved_count_ > 0) {
-      change = base + slope.cwiseProduct(a);
+      Vector change = base + slope.cwiseProduct(a);
       add_curved(a, input, change);
       change -= s;
+      return a + t.phi2.lazyProduct(change);
     }
-    return a + t.phi2.lazyProduct(change);
+    Vector next = a;
+    for (int k = 0; k < sloped_count_; ++k)
+      next += t.phi2.col(sloped_[k]) * (slope[sloped_[k]] * (a[sloped_[k]] - degC[sloped_[k]]));
+    return next;
   }
 
   /// dT/dt at given temperatures, K/s: what step() integrates.
@@ -179,6 +184,13 @@ class HeatNetwork {
     int node, boundary;
     Scalar per_s;
   };
+
+  void note_sloped(int node) {
+    for (int k = 0; k < sloped_count_; ++k) {
+      if (sloped_[k] == node) return;
+    }
+    sloped_[sloped_count_++] = node;
+  }
 
   void add_link(const Link<Scalar>& link) {
     if (link.law != LinkLaw::constant) curved_[curved_count_++] = link;
@@ -253,8 +265,9 @@ class HeatNetwork {
     return Scalar(0.0);
   }
 
-  int n_, source_count_ = 0, boundary_count_ = 0, curved_count_ = 0;
-  Matrix a_;  // 1/s
+  int n_, source_count_ = 0, boundary_count_ = 0, curved_count_ = 0, sloped_count_ = 0;
+  int sloped_[Shape<Scalar, N>::max];  // nodes whose heat grows with their temperature
+  Matrix a_;                           // 1/s
   Scalar capacity_J_per_K_[Shape<Scalar, N>::max];
   SourceTerm sources_[max_sources];
   BoundaryTerm boundaries_[max_links];

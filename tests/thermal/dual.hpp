@@ -20,6 +20,7 @@ inline Dual operator+(Dual a, const Dual& b) { return a += b; }
 inline Dual operator-(Dual a, const Dual& b) { return a -= b; }
 inline Dual operator*(Dual a, const Dual& b) { return a *= b; }
 inline Dual operator/(const Dual& a, const Dual& b) { return {a.v / b.v, (a.d - a.v / b.v * b.d) / b.v}; }
+inline bool operator==(const Dual& a, const Dual& b) { return a.v == b.v && a.d == b.d; }
 inline Dual exp(const Dual& a) { return {std::exp(a.v), std::exp(a.v) * a.d}; }
 inline Dual log(const Dual& a) { return {std::log(a.v), a.d / a.v}; }
 inline double value_of(const Dual& a) { return a.v; }
