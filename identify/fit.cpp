@@ -10,7 +10,7 @@
 namespace identify {
 namespace {
 
-constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well, sensor offset included
+constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well
 // Far beyond what a first reading is wrong by, and what a winding of class F can be above its housing.
 constexpr double initial_room_K = 60, most_excess_K = 150;
 // Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
@@ -96,6 +96,14 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   return m;
 }
 
+/// From what the housing's sensor reads and what the winding is above that; where no winding is read, above the
+/// housing.
+template <class S>
+Initial<S> begin_at(const Model<S>& model, const Start& start, const S& read_degC, const S& excess_K) {
+  const S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);
+  return {(std::isnan(start.core_degC) ? housing_degC : read_degC) + excess_K, housing_degC, read_degC + excess_K};
+}
+
 template <int N>
 struct Sums {
   Dual<N> H[N] = {};  // rows of products of sensitivities, to the diagonal's pair; values: with the residual
@@ -161,13 +169,13 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
     Dual<N> local[N];
     for (int i = 0; i < shared; ++i) local[i] = Dual<N>::variable(x[i], i);
     // All starts of a log share two directions, for no reading depends on more than the last of them.
+    const auto model = build<Dual<N>>(problem, chosen, local, l);
     std::vector<Initial<Dual<N>>> initial;
     for (std::size_t s = 0; s < log.starts.size(); ++s) {
       const int at = own + per_start_count * static_cast<int>(s);
-      const auto housing0 = Dual<N>::variable(x[at], shared), excess = Dual<N>::variable(x[at + 1], shared + 1);
-      initial.push_back({housing0 + excess, housing0});
+      initial.push_back(
+          begin_at(model, log.starts[s], Dual<N>::variable(x[at], shared), Dual<N>::variable(x[at + 1], shared + 1)));
     }
-    const auto model = build<Dual<N>>(problem, chosen, local, l);
     Sums<N> sums;
     const auto take_sums = [&] {
       const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
@@ -199,8 +207,8 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
       while (begun < log.starts.size() && k == log.starts[begun].bin) {
         take_sums();
         for (Predicted<N>* p : {&of_housing, &of_core}) {
-          p->wander.forget(initial[begun].core_degC);
-          p->disturbance.forget(initial[begun].core_degC);
+          p->wander.forget(initial[begun].own);
+          p->disturbance.forget(initial[begun].own);
         }
         ++begun;
       }
@@ -401,10 +409,13 @@ Eigen::Index initial_of(const Problem& problem, const Fit& f, std::size_t log) {
 }
 
 std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, std::size_t log) {
+  const auto model = build<double>(problem, f.chosen, f.x.data(), log);
   std::vector<Initial<double>> out;
   Eigen::Index at = initial_of(problem, f, log);
-  for (std::size_t s = 0; s < problem.logs[log].starts.size(); ++s, at += per_start_count)
-    out.push_back({f.x[at] + f.x[at + 1], f.x[at]});
+  for (const Start& start : problem.logs[log].starts) {
+    out.push_back(begin_at(model, start, f.x[at], f.x[at + 1]));
+    at += per_start_count;
+  }
   return out;
 }
 

@@ -26,12 +26,19 @@ namespace identify {
 template <class S>
 struct Initial {
   S core_degC, housing_degC;
+  S own;  // depends on this start's coordinates, and on nothing else
 };
 
 namespace replay_detail {
 
 using thermal::Boundary;
 using thermal::Drive;
+
+/// The housing where its sensor, prompt, reads this.
+template <class S>
+S housing_behind(const thermal::HousingSensor<S>& sensor, const S& read_degC) {
+  return (sensor.gain_error * 25.0 - sensor.offset_K + read_degC) / (sensor.gain_error + 1.0);
+}
 
 inline double rising(double time_s, double from_s, double width_s) {
   return 1 / (1 + std::exp(-(time_s - from_s) / width_s));
@@ -162,12 +169,11 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   std::size_t begun = 0;
   // After a pause a further mass goes on from where it is; that this depends on the earlier start is left out.
   const auto begin = [&](const Initial<S>& from) {
-    for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.core_degC);
+    for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.own);
     T[housing] = lagged = from.housing_degC;
     // A late sensor is where it reads, and not where the housing is.
     const double read = log.starts[begun].housing_degC;
-    if (begun > 0 && lags && !std::isnan(read))
-      lagged = (set.housing.gain_error * 25.0 - set.housing.offset_K + read) / (set.housing.gain_error + 1.0);
+    if (begun > 0 && lags && !std::isnan(read)) lagged = housing_behind(set.housing, S(read));
     T[model.core] = from.core_degC;
     if (model.hot_node >= 0) T[model.hot_node] = from.core_degC;
     ++begun;

@@ -403,6 +403,26 @@ TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
   EXPECT_LT(f.std_errors()[1], one.std_errors()[1]);
 }
 
+TEST(Fit, WhatASensorIsOffByIsOffAtTheStartToo) {
+  const auto offset = std::vector<Chosen>{{identify::cause_named("sensor_offset"), -1}};
+  constexpr double by_K = 9, typical_K = 5;  // the latter as in causes.cpp
+  for (const double core_every_s : {0.0, 20.0}) {
+    tests::BenchOptions o;
+    o.core_every_s = core_every_s;
+    const auto beyond_data = [&](double added_K) {
+      auto logs = tests::bench_logs({o, o, o});
+      for (auto& log : logs) {
+        for (double& T : log.of(identify::Role::housing)) T += added_K;
+      }
+      const Fit f = identify::fit(identify::problem_of(logs, sheet), offset);
+      return f.cost - f.misfit;
+    };
+    // Once for three logs, by what it is, and not again by their starts.
+    const double itself = 0.5 * by_K * by_K / (typical_K * typical_K);
+    EXPECT_NEAR(beyond_data(by_K) - beyond_data(0), itself, 1) << core_every_s;
+  }
+}
+
 TEST(Refusal, HousingAloneWithConstantResistanceGivesNoCoreTemperature) {
   tests::BenchOptions options = off_sheet(4);
   options.core_every_s = 0;
