@@ -100,7 +100,8 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
 /// housing.
 template <class S>
 Initial<S> begin_at(const Model<S>& model, const Start& start, const S& read_degC, const S& excess_K) {
-  const S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);
+  S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);
+  if (model.feels_winding) housing_degC -= model.sensor_share * excess_K;
   return {(std::isnan(start.core_degC) ? housing_degC : read_degC) + excess_K, housing_degC, read_degC + excess_K};
 }
 

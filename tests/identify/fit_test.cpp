@@ -423,6 +423,23 @@ TEST(Fit, WhatASensorIsOffByIsOffAtTheStartToo) {
   }
 }
 
+TEST(Fit, WhatASensorFeelsOfAWarmWindingItFeelsAtTheStartToo) {
+  tests::BenchOptions o;
+  o.sensor_share = 0.5;
+  o.current_A = [](double t, std::mt19937_64&) { return t < 600 ? 2.5 : 0.5; };
+  auto whole = tests::bench_logs({o}).front();
+  // A recording that was begun under load, the winding above the housing and the sensor half way.
+  constexpr std::size_t begun = 3000;
+  for (auto& column : whole.columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + begun);
+  }
+  for (double& t : whole.of(identify::Role::time)) t -= begun / o.rate_Hz;
+  const Problem problem = identify::problem_of({whole, whole, whole}, sheet);
+  const Fit f = identify::fit(problem, {{identify::cause_named("sensor_placement"), -1}});
+  EXPECT_NEAR(f.x[identify::base_count], 0.5, 0.1);
+  EXPECT_NEAR(f.x[identify::base_count + 1], problem.logs[0].starts[0].housing_degC, 1);
+}
+
 TEST(Refusal, HousingAloneWithConstantResistanceGivesNoCoreTemperature) {
   tests::BenchOptions options = off_sheet(4);
   options.core_every_s = 0;
