@@ -6,10 +6,10 @@
 //   correct  T' = a + phi2 (s(a) - s(T))          because R grows within the step: explicit Euler reads too cold
 //
 // phi_k are the exponential integrator's functions of A dt; they are a Transition, made once for a step length. Scalar
-// is double on the board, a dual number in identify: it needs + - * / with itself and double, Eigen::NumTraits, and,
-// found by argument-dependent lookup, value_of(x) (its plain value) and exp, log. Branches look at plain values only. N
-// is the number of nodes, or Eigen::Dynamic (storage for max_nodes). No heap, no state; same cost every call. Not for
-// an ISR.
+// is double on the board, a dual number in identify: it needs + - * / with itself and double, == with double (true of a
+// constant only), Eigen::NumTraits, and, found by argument-dependent lookup, value_of(x) (its plain value) and exp,
+// log. Branches look at plain values only. N is the number of nodes, or Eigen::Dynamic (storage for max_nodes). No
+// heap, no state; same cost every call. Not for an ISR.
 #pragma once
 
 #include <Eigen/Core>
