@@ -97,7 +97,8 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
 }
 
 /// From what the housing's sensor reads and what the winding is above that; where no winding is read, above the
-/// housing.
+/// housing. Of a sensor that feels a winding that is read it is right to first order in its share: all of it would
+/// leave the housing untold.
 template <class S>
 Initial<S> begin_at(const Model<S>& model, const Start& start, const S& read_degC, const S& excess_K) {
   S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);

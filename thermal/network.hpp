@@ -105,7 +105,10 @@ class HeatNetwork {
     Vector base = Vector::Zero(n_), slope = Vector::Zero(n_);  // s = base + slope * T (+ curved laws)
     gather(input, base, slope);
     Vector s = base;
-    for (int k = 0; k < sloped_count_; ++k) s[sloped_[k]] += slope[sloped_[k]] * degC[sloped_[k]];
+    for (int k = 0; k < sloped_count_; ++k) {
+      const int i = sloped_[k];
+      s[i] += slope[i] * degC[i];
+    }
     if (curved_count_ > 0) add_curved(degC, input, s);
     const Vector a = t.phi0.lazyProduct(degC) + t.phi1.lazyProduct(s);
     if (curved_count_ > 0) {
@@ -115,8 +118,10 @@ class HeatNetwork {
       return a + t.phi2.lazyProduct(change);
     }
     Vector next = a;
-    for (int k = 0; k < sloped_count_; ++k)
-      next += t.phi2.col(sloped_[k]) * (slope[sloped_[k]] * (a[sloped_[k]] - degC[sloped_[k]]));
+    for (int k = 0; k < sloped_count_; ++k) {
+      const int i = sloped_[k];
+      next += t.phi2.col(i) * (slope[i] * (a[i] - degC[i]));
+    }
     return next;
   }
 

@@ -404,8 +404,8 @@ TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
 }
 
 TEST(Fit, WhatASensorIsOffByIsOffAtTheStartToo) {
-  const auto offset = std::vector<Chosen>{{identify::cause_named("sensor_offset"), -1}};
-  constexpr double by_K = 9, typical_K = 5;  // the latter as in causes.cpp
+  const Chosen offset{identify::cause_named("sensor_offset"), -1};
+  const double by_K = 9, typical_K = identify::cause_of(offset).parameters[0].typical;
   for (const double core_every_s : {0.0, 20.0}) {
     tests::BenchOptions o;
     o.core_every_s = core_every_s;
@@ -414,7 +414,7 @@ TEST(Fit, WhatASensorIsOffByIsOffAtTheStartToo) {
       for (auto& log : logs) {
         for (double& T : log.of(identify::Role::housing)) T += added_K;
       }
-      const Fit f = identify::fit(identify::problem_of(logs, sheet), offset);
+      const Fit f = identify::fit(identify::problem_of(logs, sheet), {offset});
       return f.cost - f.misfit;
     };
     // Once for three logs, by what it is, and not again by their starts.
