@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "identify/replay.hpp"
 #include "identify/whitening.hpp"
@@ -269,89 +270,110 @@ double narrowing(Eigen::MatrixXd H, const std::vector<Coordinate>& c, const std:
   return H.ldlt().vectorD().array().abs().log().sum();
 }
 
-/// Levenberg-Marquardt from x, `most` steps; the damping goes by what a step keeps of its promise.
+/// The misfit with its priors near x, as a parabola; `held` are the coordinates that a bound holds there.
+struct Parabola {
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd curvature;
+  std::vector<bool> held;
+
+  Parabola(const std::vector<Coordinate>& c, const Eigen::VectorXd& x, const Evaluation& at)
+      : gradient(at.gradient), curvature(at.information), held(c.size()) {
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const Coordinate& ci = c[static_cast<std::size_t>(i)];
+      gradient[i] += (x[i] - ci.prior) / (ci.sd * ci.sd);
+      curvature(i, i) += 1 / (ci.sd * ci.sd);
+      held[static_cast<std::size_t>(i)] = (x[i] <= ci.low && gradient[i] > 0) || (x[i] >= ci.high && gradient[i] < 0);
+    }
+  }
+
+  /// The step that undoes `slope`, shortened by Marquardt's damping.
+  Eigen::VectorXd step_against(Eigen::VectorXd slope, double damping) const {
+    Eigen::MatrixXd A = curvature;
+    for (Eigen::Index i = 0; i < slope.size(); ++i) {
+      A(i, i) *= 1 + damping;
+      if (!held[static_cast<std::size_t>(i)]) continue;
+      decouple(A, i, 1);
+      slope[i] = 0;
+    }
+    return A.ldlt().solve(-slope);
+  }
+};
+
+/// x and a step from it, of each coordinate two standard deviations at most and within its bounds.
+Eigen::VectorXd stepped(const std::vector<Coordinate>& c, Eigen::VectorXd x, const Eigen::VectorXd& dx) {
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const Coordinate& ci = c[static_cast<std::size_t>(i)];
+    x[i] = std::clamp(x[i] + std::clamp(dx[i], -2 * ci.sd, 2 * ci.sd), ci.low, ci.high);
+  }
+  return x;
+}
+
+/// Levenberg-Marquardt from x, `most` steps; the damping goes by what a step keeps of its promise. Valleys here are
+/// long and curved: R1 C1 is known, R1 alone hardly. A step that ends on a slope is therefore bent back by what the
+/// gradient there is off from what the parabola foretold, the geodesic acceleration of Transtrum and Sethna
+/// (arXiv:1207.4999) taken from gradients, before it is given up for a shorter one.
 Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
             const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
-  const Eigen::Index n = x.size();
   Fit out;
   out.chosen = chosen;
   Evaluation now, trial;
-  for (Eigen::Index i = 0; i < n; ++i)
-    x[i] = std::clamp(x[i], c[static_cast<std::size_t>(i)].low, c[static_cast<std::size_t>(i)].high);
-  if (!evaluate_any(problem, averaged, chosen, x, now)) return out;
-  double cost = now.misfit + prior_cost(c, x), damping = 1e-3;
-  Eigen::VectorXd g(n);
-  Eigen::MatrixXd H(n, n);
-  std::vector<bool> held(static_cast<std::size_t>(n));
-  const auto linearise = [&] {
-    g = now.gradient;
-    H = now.information;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Coordinate& ci = c[static_cast<std::size_t>(i)];
-      g[i] += (x[i] - ci.prior) / (ci.sd * ci.sd);
-      H(i, i) += 1 / (ci.sd * ci.sd);
-      held[static_cast<std::size_t>(i)] = (x[i] <= ci.low && g[i] > 0) || (x[i] >= ci.high && g[i] < 0);
-    }
+  constexpr double impossible = std::numeric_limits<double>::infinity();
+  const auto cost_at = [&](const Eigen::VectorXd& at, Evaluation& e) {
+    return evaluate_any(problem, averaged, chosen, at, e) ? e.misfit + prior_cost(c, at) : impossible;
   };
-  const auto step_with = [&](double lambda) -> Eigen::VectorXd {
-    Eigen::MatrixXd A = H;
-    Eigen::VectorXd b = -g;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      A(i, i) *= 1 + lambda;
-      if (!held[static_cast<std::size_t>(i)]) continue;
-      decouple(A, i, 1);
-      b[i] = 0;
-    }
-    return A.ldlt().solve(b);
-  };
-  linearise();
+  x = stepped(c, x, Eigen::VectorXd::Zero(x.size()));
+  double cost = cost_at(x, now), damping = 1e-3;
+  if (cost == impossible) return out;
+  Parabola here(c, x, now);
   for (;;) {
     // Newton decrement: what a full step still promises. Below 0.005 in log-likelihood no decision changes.
-    const Eigen::VectorXd newton = step_with(0);
-    out.promise = -0.5 * g.dot(newton);
+    const Eigen::VectorXd newton = here.step_against(here.gradient, 0);
+    out.promise = -0.5 * here.gradient.dot(newton);
     out.settled = out.promise < 0.005;
     if (out.settled || out.iterations == most) break;
     ++out.iterations;
     bool better = false;
-    for (int attempt = 0; attempt < 9; ++attempt) {
-      const Eigen::VectorXd dx = damping < 1e-5 ? newton : step_with(damping);
-      Eigen::VectorXd next = x;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const Coordinate& ci = c[static_cast<std::size_t>(i)];
-        next[i] = std::clamp(x[i] + std::clamp(dx[i], -2 * ci.sd, 2 * ci.sd), ci.low, ci.high);
+    for (int attempt = 0; attempt < 9 && !better; ++attempt) {
+      Eigen::VectorXd next = stepped(c, x, damping < 1e-5 ? newton : here.step_against(here.gradient, damping));
+      const Eigen::VectorXd moved = next - x;
+      double next_cost = cost_at(next, trial);
+      const bool overshot = next_cost >= cost;
+      if (overshot && next_cost < impossible) {
+        const Parabola there(c, next, trial);
+        const Eigen::VectorXd foretold = here.gradient + here.curvature * moved;
+        next = stepped(c, next, there.step_against(there.gradient - foretold, damping));
+        next_cost = cost_at(next, trial);
       }
-      if (evaluate_any(problem, averaged, chosen, next, trial)) {
-        const double next_cost = trial.misfit + prior_cost(c, next);
-        if (next_cost < cost) {
-          // A step that delivers little of what it promised overshot a curved valley: R1 C1 is known, R1 alone hardly.
-          const Eigen::VectorXd moved = next - x;
-          const double promised = -g.dot(moved) - 0.5 * moved.dot(H * moved);
-          const double kept = promised > 0 ? (cost - next_cost) / promised : 0;
-          damping = kept > 0.75 ? damping * 0.1 : kept < 0.3 ? std::max(damping, 1e-3) * 8 : damping;
-          cost = next_cost;
-          x = next;
-          std::swap(now, trial);
-          better = true;
-          break;
-        }
+      better = next_cost < cost;
+      if (!better) {
+        damping = std::min(1e9, std::max(damping, 1e-4) * 8);
+        continue;
       }
-      damping = std::min(1e9, std::max(damping, 1e-4) * 8);
+      const double promised = -here.gradient.dot(moved) - 0.5 * moved.dot(here.curvature * moved);
+      const double kept = promised > 0 ? (cost - next_cost) / promised : 0;
+      if (kept < 0.3)
+        damping = std::max(damping, 1e-3) * 8;
+      else if (kept > 0.75 && !overshot)
+        damping *= 0.1;
+      cost = next_cost;
+      x = next;
+      std::swap(now, trial);
     }
     if (!better) break;
-    linearise();
+    here = Parabola(c, x, now);
   }
-  out.narrowing = narrowing(H, c, held);
+  out.narrowing = narrowing(here.curvature, c, here.held);
   for (std::size_t i = 0; i < problem.leeway.size(); ++i)
     out.uneven_per_A2 += now.leeway[averaged.column(i, 0)] * problem.leeway[i].uneven_per_A2;
   // From phases that share their heat at once to phases that share none (problem.cpp).
   out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
   out.x = x;
-  out.information = H;
+  out.information = here.curvature;
   out.from_data = now.information;
   out.cost = cost;
   out.misfit = now.misfit;
   out.readings = now.readings;
-  out.at_bound = held;
+  out.at_bound = here.held;
   return out;
 }
 
