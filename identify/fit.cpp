@@ -321,6 +321,11 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   const auto cost_at = [&](const Eigen::VectorXd& at, Evaluation& e) {
     return evaluate_any(problem, averaged, chosen, at, e) ? e.misfit + prior_cost(c, at) : impossible;
   };
+  const auto length = [&](const Eigen::VectorXd& dx) {  // in standard deviations, squared
+    double sum = 0;
+    for (Eigen::Index i = 0; i < dx.size(); ++i) sum += std::pow(dx[i] / c[static_cast<std::size_t>(i)].sd, 2);
+    return sum;
+  };
   x = stepped(c, x, Eigen::VectorXd::Zero(x.size()));
   double cost = cost_at(x, now), damping = 1e-3;
   if (cost == impossible) return out;
@@ -341,8 +346,11 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
       if (overshot && next_cost < impossible) {
         const Parabola there(c, next, trial);
         const Eigen::VectorXd foretold = here.gradient + here.curvature * moved;
-        next = stepped(c, next, there.step_against(there.gradient - foretold, damping));
-        next_cost = cost_at(next, trial);
+        const Eigen::VectorXd bent = stepped(c, next, there.step_against(there.gradient - foretold, damping));
+        if (length(bent - next) < length(moved)) {  // else what is left out, the third order, is larger still
+          next = bent;
+          next_cost = cost_at(next, trial);
+        }
       }
       better = next_cost < cost;
       if (!better) {
@@ -353,7 +361,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
       const double kept = promised > 0 ? (cost - next_cost) / promised : 0;
       if (kept < 0.3)
         damping = std::max(damping, 1e-3) * 8;
-      else if (kept > 0.75 && !overshot)
+      else if (kept > 0.75 && !overshot && attempt == 0)  // else the next would be as much too long
         damping *= 0.1;
       cost = next_cost;
       x = next;

@@ -84,8 +84,8 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
 std::string misread_columns(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
-  const Fit two = fit(problem, {});
   const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
+  const Fit& two = found.two_resistors;
   const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
     const double left = excess(fit(read, chosen));
@@ -162,7 +162,7 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 double clocks_apart_s(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  double late_s = 0, least = fraction_left * excess(fit(problem, {}));
+  double late_s = 0, least = fraction_left * excess(found.two_resistors);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
   for (const double tried_s : {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s}) {

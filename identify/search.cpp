@@ -399,9 +399,9 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   Field field;
   const auto all = available(problem, without);
   doing("fitting each cause alone");
-  const Fit two_resistors = fit(problem, {});
-  problem.leeway = ordinary_leeway(problem, two_resistors);
-  fit_alone_and_settle_noise(problem, two_resistors, all, margins, field, out);
+  out.two_resistors = fit(problem, {});
+  problem.leeway = ordinary_leeway(problem, out.two_resistors);
+  fit_alone_and_settle_noise(problem, out.two_resistors, all, margins, field, out);
   out.base = out.chosen = field.base;
   out.noise = problem.noise;
   out.singles = field.singles;

@@ -70,6 +70,7 @@ const char* word(Verdict verdict);
 inline bool names_causes(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
 
 struct Search {
+  Fit two_resistors;  // to the noise of the recording
   Candidate base;
   std::vector<Candidate> singles;              // best first, one per cause (per log for causes that pick one)
   std::vector<Candidate> sets;                 // sets of the size that was chosen, best first

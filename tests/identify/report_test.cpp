@@ -630,7 +630,7 @@ TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLo
   };
   identify::Search found;
   found.verdict = identify::Verdict::explained;
-  found.base.fit = identify::fit(problem, {});
+  found.two_resistors = found.base.fit = identify::fit(problem, {});
   found.singles = {fitted("sensor_offset")};
   found.chosen = found.singles.front();
   EXPECT_NE(identify::suspicion(problem, found, logs, std::nullopt).find("the two columns are swapped"),
