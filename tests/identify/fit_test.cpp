@@ -390,6 +390,20 @@ TEST(Fit, OfAMotorThatCannotBeSimulatedNoCauseIsTried) {
   EXPECT_FALSE(identify::best_alone(problem).valid());
 }
 
+TEST(Fit, EveryCauseIsFittedToTheEndOfItsValleyThoughAnotherIsTheTruth) {
+  tests::BenchOptions options;
+  options.seconds = 1200;
+  options.core_every_s = 30;
+  options.extra_housing_W = [](double, double, double) { return 0.3; };
+  const auto problem = identify::problem_of(tests::bench_logs({options}), tests::ec_16());
+  const Fit two = identify::fit(problem, {});
+  for (std::size_t c = 0; c < identify::causes().size(); ++c) {
+    if (!problem.possible(identify::causes()[c])) continue;
+    const Fit f = identify::fit(problem, {{static_cast<int>(c), -1}}, {&two});
+    EXPECT_TRUE(f.settled) << identify::causes()[c].id << " still promises " << f.promise;
+  }
+}
+
 TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
   tests::BenchOptions cold = off_sheet(7), warm = off_sheet(8);
   warm.start_degC = 60;
