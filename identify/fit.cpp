@@ -330,13 +330,14 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   double cost = cost_at(x, now), damping = 1e-3;
   if (cost == impossible) return out;
   Parabola here(c, x, now);
-  for (;;) {
-    // Newton decrement: what a full step still promises. Below 0.005 in log-likelihood no decision changes.
+  constexpr double enough = 0.005;  // in log-likelihood: less changes no decision
+  for (bool stuck = false;;) {
     const Eigen::VectorXd newton = here.step_against(here.gradient, 0);
-    out.promise = -0.5 * here.gradient.dot(newton);
-    out.settled = out.promise < 0.005;
-    if (out.settled || out.iterations == most) break;
+    out.promise = -0.5 * here.gradient.dot(newton);  // Newton decrement: what a full step still promises
+    out.settled = out.promise < enough;
+    if (out.settled || stuck || out.iterations == most) break;
     ++out.iterations;
+    const double before = cost;
     bool better = false;
     for (int attempt = 0; attempt < 9 && !better; ++attempt) {
       Eigen::VectorXd next = stepped(c, x, damping < 1e-5 ? newton : here.step_against(here.gradient, damping));
@@ -367,8 +368,8 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
       x = next;
       std::swap(now, trial);
     }
-    if (!better) break;
     here = Parabola(c, x, now);
+    stuck = before - cost < enough / 10;  // at a kink: the moment of a cooling_change falls into another bin
   }
   out.narrowing = narrowing(here.curvature, c, here.held);
   for (std::size_t i = 0; i < problem.leeway.size(); ++i)
