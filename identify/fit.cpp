@@ -321,11 +321,8 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   const auto cost_at = [&](const Eigen::VectorXd& at, Evaluation& e) {
     return evaluate_any(problem, averaged, chosen, at, e) ? e.misfit + prior_cost(c, at) : impossible;
   };
-  const auto length = [&](const Eigen::VectorXd& dx) {  // in standard deviations, squared
-    double sum = 0;
-    for (Eigen::Index i = 0; i < dx.size(); ++i) sum += std::pow(dx[i] / c[static_cast<std::size_t>(i)].sd, 2);
-    return sum;
-  };
+  Eigen::VectorXd sd(x.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i) sd[i] = c[static_cast<std::size_t>(i)].sd;
   x = stepped(c, x, Eigen::VectorXd::Zero(x.size()));
   double cost = cost_at(x, now), damping = 1e-3;
   if (cost == impossible) return out;
@@ -348,7 +345,8 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
         const Parabola there(c, next, trial);
         const Eigen::VectorXd foretold = here.gradient + here.curvature * moved;
         const Eigen::VectorXd bent = stepped(c, next, there.step_against(there.gradient - foretold, damping));
-        if (length(bent - next) < length(moved)) {  // else what is left out, the third order, is larger still
+        // Where the bend is longer than the step, what it leaves out is larger still.
+        if ((bent - next).cwiseQuotient(sd).norm() < moved.cwiseQuotient(sd).norm()) {
           next = bent;
           next_cost = cost_at(next, trial);
         }
