@@ -12,8 +12,8 @@ namespace {
 // Every pair is looked at with a few Newton steps, and those that may come near the best are fitted to the end: a look
 // errs by about so much evidence, or by this share of what the pair gains. Chosen for speed: half or double of all but
 // the bins at once changes no answer of 20 logs (score duty-sparse designed-sparse pairs-designed zero --first 770
-// --at-most 5 --quick), nor does a third of the bins. Three times as many change none of 288 (ten rows, --first 34000 and
-// 35000, and --blind, 36000).
+// --at-most 5 --quick), nor do three eighths of the bins. Three times as many change none of 288 (ten rows, --first
+// 34000 and 35000, and --blind, 36000).
 constexpr int look_steps = 2;
 constexpr double look_errs = 40, look_errs_share = 0.05;
 constexpr std::size_t most_finished = 24;
