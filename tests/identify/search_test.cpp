@@ -309,6 +309,12 @@ TEST(Search, ASensorThatFeelsAFastWindingIsReadInShorterBins) {
   EXPECT_EQ(bin_s(fast), usual_s) << "a sensor that feels the load, and not within a bin";
 }
 
+TEST(Search, ASensorAtAFastWindingHasNoHotSpotBesideIt) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // The winding follows within half a second and is read every 0.1 s, to more noise than it bends in bins of 0.2 s.
+  expect_named({.seed = 3103844, .effects = {"sensor_placement"}}, "hot_spot beside it, evidence 39");
+}
+
 TEST(Search, WithoutASheetNothingIsNamedOfAFastWindingThatHidesNothing) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   // Windings of a second: in bins of a second a delay, a lag, an offset of the current were named.
