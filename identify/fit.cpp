@@ -377,6 +377,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   out.x = x;
   out.information = here.curvature;
   out.from_data = now.information;
+  out.gradient = here.gradient;
   out.cost = cost;
   out.misfit = now.misfit;
   out.readings = now.readings;

@@ -20,6 +20,7 @@ struct Fit {
   Eigen::VectorXd x;            // coordinates
   Eigen::MatrixXd information;  // of data and prior (Gauss-Newton Hessian)
   Eigen::MatrixXd from_data;    // of the data alone
+  Eigen::VectorXd gradient;     // of the cost: none but where a bound holds it back
   double cost = 1e300;          // half the sum of squared whitened residuals, plus prior
   double misfit = 1e300;        // the same without prior
   double uneven_per_A2 = 0;     // what its residuals show of Leeway::uneven_per_A2; a replay has it

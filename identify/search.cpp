@@ -334,14 +334,17 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
     out.singles[i].tied = likelier[i] > std::max(margins.likelier, most - margins.tie);
 }
 
-/// The first parameter of the causes that its bound holds; empty when none does. Nothing at all may well be true, and
-/// of a share all.
-std::string at_a_bound(const Fit& f) {
-  std::size_t at = base_count;
+/// The first parameter of the causes that its bound holds against evidence worth more than `tie`; empty when none does.
+/// What lies at a bound, or near it, is held there by noise half of the time. Nothing at all may well be true, and of a
+/// share all.
+std::string held_by_a_bound(const Fit& f, double tie) {
+  const Eigen::MatrixXd covariance = f.covariance(false);
+  Eigen::Index at = base_count;
   for (const Chosen& chosen : f.chosen) {
     for (const Parameter& p : cause_of(chosen).parameters) {
-      const bool natural = std::string_view(p.name) == "share" || (p.low == 0 && !(f.x[static_cast<int>(at)] > 0));
-      if (f.at_bound[at++] && !natural) return p.name;
+      const bool natural = std::string_view(p.name) == "share" || (p.low == 0 && !(f.x[at] > 0));
+      const double gain = f.gradient[at] * f.gradient[at] * covariance(at, at);  // of a parabola, were the bound let go
+      if (f.at_bound[static_cast<std::size_t>(at++)] && !natural && gain > tie) return p.name;
     }
   }
   return "";
@@ -424,7 +427,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   decide(problem, left, without_causes, reach, margins, out);
   doing("fitting what a board gets");
   refit_for_the_board(judged, margins, out);
-  const std::string beyond = at_a_bound(out.chosen.fit);
+  const std::string beyond = held_by_a_bound(out.chosen.fit, margins.tie);
   if (!beyond.empty() && names_causes(out.verdict)) {
     out.verdict = Verdict::unknown_cause;
     out.steps.push_back(

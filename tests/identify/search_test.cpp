@@ -509,6 +509,13 @@ TEST(Search, ACauseThatOnlyItsBoundHoldsExplainsNothing) {
   EXPECT_EQ(found.verdict, Verdict::unknown_cause) << found.steps.back();
 }
 
+TEST(Search, WhatNoiseAloneHoldsAtItsBoundIsNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // A coefficient of 0.0089 per K, of 0.009 at most.
+  expect_named({.duty = tests::Duty::designed, .seed = 41001135, .effects = {"clock_delay", "copper_coefficient"}},
+               "unknown cause, alpha at its bound");
+}
+
 /// Told 0.4 A more than flows; taken for a gain of one sign alone it was not tried.
 TEST(Search, AnOffsetOfAMotorThatRunsOneWayIsFoundToo) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
