@@ -108,7 +108,7 @@ const std::vector<Cause>& causes() {
            "rise by 80 K or more; paint the housing", LinkLaw::radiation),
       edit("cooling_change", "the cooling changed (fan, coolant, draught) at a moment", Edit::cooling_step,
            Needs::nothing,
-           {{"factor", "", Scale::one, 0.1, 20, 0.7, true, 1},
+           {{"factor", "", Scale::one, 0.2, 5, 0.7, true, 1},
             {"time", "s", Scale::duration, 0.04, 0.96, 0.35, false, 0.5}},
            "a kink at one moment", "neighbour_heat, ambient_drift", "repeat the same profile twice"),
       edit("cooling_change", "the cooling differs between the logs (fan, coolant, mounting)", Edit::cooling_of_log,
