@@ -204,18 +204,16 @@ void rough_search(Problem& whole) {
   whole.belief = bent ? centred_at(best, alone) : best;
 }
 
-/// A sensor that feels the winding shows how its temperature bends within a bin. Where that, by a fit with such a
-/// sensor, is evidence that a cause could be named on: an eighth of the winding's time constant. Infinite where it is
-/// not.
+/// A sensor that feels the winding shows how its temperature bends within a bin: an eighth of the winding's time
+/// constant where that, by a fit with such a sensor, is evidence that a further cause could be named on; else infinite.
 double felt_winding_bin_s(const Problem& problem) {
   const Fit felt = fit(problem, {{cause_named("sensor_placement"), -1}});
   if (!felt.valid()) return std::numeric_limits<double>::infinity();
   const Physical p = physical(felt.x);
   const double ohm = problem.heated_by_power() ? 1 : problem.belief.ohm, share = felt.x[base_count];
-  // Of a misplaced sensor 5 of 36 logs were given a hot spot or a clock's delay beside it where it took more than the
-  // readings' noise, and 4 of 30 at a quarter (score duty-none duty-sparse designed-sparse --only sensor_placement
-  // --quick,
-  // --seeds 12 --first 3100, --seeds 10 --first 38004); none now.
+  // Where it took more than the readings' noise, 5 of 36 logs of a misplaced sensor were given a hot spot or a clock's
+  // delay beside it, and 4 of 30 at a quarter; none now (score duty-none duty-sparse designed-sparse --quick --only
+  // sensor_placement, --seeds 12 --first 3100, --seeds 10 --first 38004).
   constexpr double worth = 10;
   double evidence = 0;
   for (const Bins& log : problem.logs) {
