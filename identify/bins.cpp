@@ -242,7 +242,7 @@ std::vector<bool> enabled(const Inputs& in, double noise_A) {
 /// A whole number of samples a bin, so that all bins hold equally many.
 double width_s_of(const Log& log, double usual_s, double finest_s) {
   const double duration_s = log.of(Role::time).back();
-  const double wanted_s = std::max({usual_s, std::min(longest_bin_s, finest_s), duration_s / most_bins});
+  const double wanted_s = std::max({usual_s, finest_s, duration_s / most_bins});
   return usual_s * std::max(1.0, std::round(wanted_s / usual_s));
 }
 

@@ -327,8 +327,9 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   double cost = cost_at(x, now), damping = 1e-3;
   if (cost == impossible) return out;
   Parabola here(c, x, now);
-  constexpr double enough = 0.005;  // in log-likelihood: less changes no decision
   for (bool stuck = false;;) {
+    // In log-likelihood, so little that it changes no decision; of a model that misses by more than noise as much more.
+    const double enough = 0.005 * std::max(1.0, 2 * now.misfit / std::max(1, now.readings));
     const Eigen::VectorXd newton = here.step_against(here.gradient, 0);
     out.promise = -0.5 * here.gradient.dot(newton);  // Newton decrement: what a full step still promises
     out.settled = out.promise < enough;

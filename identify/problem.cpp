@@ -16,6 +16,8 @@ namespace {
 
 /// Ten hours in bins of a second, which a search is to do within 10 s on two cores (README): of more, coarser ones.
 constexpr double most_fine_bins = 36000;
+/// Of a slow winding fewer do: bins are then longer than longest_bin_s, up to a sixteenth of its time constant.
+constexpr double enough_bins = 5000;
 
 using thermal::Drive;
 
@@ -152,13 +154,15 @@ void set_scales(Problem& problem) {
   problem.speed08_mean = speed08 / n;
 }
 
+constexpr std::size_t most_rough_bins = 8000;
+
 /// Without a sheet: several guesses of the time constants, each fitted to the longest log, the best one kept. One log
 /// only, because several may differ in just what is to be found out.
 void rough_search(Problem& whole) {
   Problem problem = whole;
   const auto longest = std::max_element(whole.logs.begin(), whole.logs.end(),
                                         [](const Bins& a, const Bins& b) { return a.duration_s() < b.duration_s(); });
-  problem.logs = {*longest};
+  problem.logs = {merged(*longest, 1 + longest->bins.size() / most_rough_bins)};
 
   double rise_K = 1;
   for (const Bin& bin : longest->bins) {
@@ -177,8 +181,9 @@ void rough_search(Problem& whole) {
     belief.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, belief.C2_J_per_K);
     return belief;
   };
-  Belief best;
+  Belief best, guess;
   double least = 1e300;
+  bool beyond = false;
   for (const double housing_s : {120.0, 600.0, 2400.0}) {
     for (const double ratio : {0.1, 0.6}) {
       Belief b = problem.belief;
@@ -192,12 +197,19 @@ void rough_search(Problem& whole) {
       const Fit f = fit(problem, {});
       if (f.cost >= least || !f.valid()) continue;
       least = f.cost;
+      guess = b;
       best = centred_at(b, f);
+      beyond = std::find(f.at_bound.begin(), f.at_bound.begin() + base_count, true) != f.at_bound.begin() + base_count;
     }
   }
   if (least == 1e300) return;
   problem.belief = best;
-  const Fit alone = best_alone(problem);
+  Fit alone = best_alone(problem);
+  if (beyond) {  // from where what is missing has bent two resistors to, no cause may find back
+    problem.belief = guess;
+    Fit straight = best_alone(problem);
+    if (straight.cost < alone.cost) alone = std::move(straight);
+  }
   // By half: beyond recognition, by what is missing. Where any gain was enough, a log that hid nothing got a name
   // (score's motors, designed, dense, seed 17).
   const bool bent = alone.cost < least / 2;
@@ -366,13 +378,16 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     return std::count_if(core.begin(), core.end(), [](double x) { return !std::isnan(x); }) >
            static_cast<std::ptrdiff_t>(core.size() / 2);
   });
-  double longest_s = 0;
-  for (const Log& log : logs) longest_s = std::max(longest_s, log.of(Role::time).back());
+  double longest_s = 0, all_s = 0;
+  for (const Log& log : logs) {
+    longest_s = std::max(longest_s, log.of(Role::time).back());
+    all_s += log.of(Role::time).back();
+  }
   // From logs of 20 min without structure bins of half a time constant made C1 5 and 8 percent too small, of a
   // quarter 1 and 2 (designed 5004, duty 5102). Of a long day half must do, for speed.
   const auto fine_enough_s = [&](double winding_s) {
-    const double bin_s = std::clamp(longest_s / most_fine_bins, winding_s / 4, winding_s / 2);
-    return dense ? std::min(bin_s, longest_bin_s) / 2 : bin_s;
+    const double bin_s = std::min(longest_bin_s, std::clamp(longest_s / most_fine_bins, winding_s / 4, winding_s / 2));
+    return std::max(dense ? bin_s / 2 : bin_s, std::min(all_s / enough_bins, winding_s / 16));
   };
   const double usual_winding_s = 4;  // until the log has shown its own
   const auto winding_s = [&] { return problem.belief.R1_K_per_W * problem.belief.C1_J_per_K; };
@@ -394,7 +409,8 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   }
   if (!motor) {
     rough_search(problem);
-    if (const double bin_s = fine_enough_s(winding_s()); bin_s < finest_s) take_in(finest_s = bin_s);
+    const double bin_s = fine_enough_s(winding_s());
+    if (bin_s < finest_s || bin_s >= 2 * finest_s) take_in(finest_s = bin_s);
   }
   if (const double bin_s = felt_winding_bin_s(problem); bin_s < finest_s) take_in(bin_s);
   if (!problem.heated_by_power()) {
