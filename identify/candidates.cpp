@@ -96,6 +96,8 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
                                   const std::vector<Candidate>& before) {
   const Problem rough = coarse(problem, base.fit);
   const bool shorter = is_shorter(rough, problem);
+  Candidate rough_base = base;
+  if (shorter) rough_base.fit = fit(rough, {}, {&base.fit});
   std::vector<Fit> fits(all.size());
   in_parallel(all.size(), [&](std::size_t i) {
     const std::vector<Chosen> alone = {all[i]};
@@ -104,10 +106,11 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
     fits[i] = fit(rough, alone, {known == before.end() ? &base.fit : &known->fit});
     Fit anew = fit(rough, alone);
     if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
+    if (fits[i].cost < rough_base.fit.cost + 1) return;
+    Fit beside = fit(rough, alone, {&rough_base.fit});  // where it was is a poor valley by now
+    if (beside.cost < fits[i].cost) fits[i] = std::move(beside);
   });
   std::erase_if(fits, [](const Fit& f) { return !f.valid(); });
-  Candidate rough_base = base;
-  if (shorter) rough_base.fit = fit(rough, {}, {&base.fit});
   double most = 0;
   for (const Fit& f : fits) most = std::max(most, rough_base.fit.surprise() - f.surprise());
   std::vector<Candidate> out(fits.size());

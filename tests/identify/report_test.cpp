@@ -688,12 +688,12 @@ TEST(Report, APictureNamesWhatItShows) {
 identify::Report foretold(std::uint64_t seed) {
   identify::HoldOut held;
   held.fraction = 0.25;
-  return identify::discover(tests::traction_drive("hotcore_drive_" + std::to_string(seed) + ".csv", seed), std::nullopt,
-                            held);
+  return identify::discover(tests::traction_drives("hotcore_drive_" + std::to_string(seed) + ".csv", seed),
+                            std::nullopt, held);
 }
 
 TEST(Traction, AMinuteSaysNothingOfAMotorWithoutASheet) {
-  auto logs = tests::traction_drive("hotcore_minute.csv", 44);
+  auto logs = tests::traction_drives("hotcore_minute.csv", 44);
   for (auto& column : logs[0].columns) column.resize(std::min<std::size_t>(column.size(), 120));
   const identify::Report report = identify::discover(logs, std::nullopt);
   EXPECT_EQ(report.verdict, "insufficient");
@@ -724,6 +724,28 @@ TEST(Traction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
   EXPECT_TRUE(report.causes.empty());
   EXPECT_EQ(report.held_out->nearest.size(), 2u);
   EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
+}
+
+TEST(Traction, IronLossThatBendsTwoResistorsBeyondTheirBoundsDoesNotBendWhereCausesStart) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const identify::Belief b =
+      identify::problem_of(tests::traction_drives("hotcore_bent.csv", 13, 5), std::nullopt).belief;
+  EXPECT_LT(b.R2_K_per_W * b.C2_J_per_K, 1000) << "s, of a yoke that settles within minutes; 6.5e7 by two resistors";
+}
+
+TEST(Traction, ASlowWindingRecordedForHoursIsReadInLongBins) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto logs = tests::traction_drives("hotcore_hours.csv", 4, 5);
+  const identify::Problem problem = identify::problem_of(logs, std::nullopt);
+  identify::Problem fine = problem;
+  fine.logs.clear();
+  for (const identify::Log& log : logs) fine.logs.push_back(identify::bins_of(log, 0.5));
+  EXPECT_EQ(fine.logs[0].width_s, 0.5);
+  EXPECT_GT(problem.logs[0].width_s, 3);
+  const identify::Physical found = identify::physical(identify::fit(problem, {}).x),
+                           of_rows = identify::physical(identify::fit(fine, {}).x);
+  EXPECT_NEAR(found.R1_K_per_W / of_rows.R1_K_per_W, 1, 0.01);
+  EXPECT_NEAR(found.C1_J_per_K / of_rows.C1_J_per_K, 1, 0.01);
 }
 
 TEST(Program, UnknownMotorIsAnsweredWithTheNearest) {

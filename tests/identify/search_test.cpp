@@ -629,6 +629,14 @@ TEST(Search, TheBaselineDoesNotStayInAPoorValley) {
   EXPECT_LT(found.singles.front().gain, 3) << "25 before the four started again";
 }
 
+TEST(Search, NoCauseStaysInAPoorValleyThatTwoResistorsHaveLeft) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // A board that heats the housing six times as much as copper does. A cause may do nothing, and then costs its prior.
+  const Hidden h = hidden({.duty = tests::Duty::designed, .seed = 50004132, .effects = {"board_heat"}});
+  for (const identify::Candidate& single : identify::search(h.problem).singles)
+    EXPECT_GT(single.gain, -20) << identify::names_of(single.fit.chosen).front() << "; six had -578 to -625";
+}
+
 TEST(Search, WindingAndHousingAreNotExchangedWhereTheSheetIsFarOff) {
   tests::HiddenLogOptions slow_winding;
   slow_winding.duty = tests::Duty::designed;

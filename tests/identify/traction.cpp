@@ -21,10 +21,11 @@ int main(int argc, char** argv) {
   // The promise for a measured drive of this kind: rms of the winding where nothing was fitted.
   constexpr double most_K = 4;
   CLI::App app{"What identify foretells of traction drives of five masses"};
-  int seeds = 20;
+  int seeds = 20, drives = 1;
   std::uint64_t first = tests::rotating_seed();
   bool json = false;
-  app.add_option("--seeds", seeds, "drives")->capture_default_str();
+  app.add_option("--seeds", seeds, "motors")->capture_default_str();
+  app.add_option("--drives", drives, "of each motor")->capture_default_str();
   app.add_option("--first", first, "first seed")->capture_default_str();
   app.add_flag("--json", json, "the drives as JSON");
   CLI11_PARSE(app, argc, argv);
@@ -36,7 +37,7 @@ int main(int argc, char** argv) {
   int answered = 0, kept = 0, kept_by_two = 0;
   for (int s = 0; s < seeds; ++s) {
     const std::uint64_t seed = first + static_cast<std::uint64_t>(s);
-    const auto logs = tests::traction_drive(fmt::format("hotcore_traction_{}.csv", getpid()), seed);
+    const auto logs = tests::traction_drives(fmt::format("hotcore_traction_{}.csv", getpid()), seed, drives);
     const auto report = identify::discover(logs, std::nullopt, held);
     const double two_K = report.held_out->before.core_K, found_K = report.held_out->after.core_K;
     before.push_back(two_K);
