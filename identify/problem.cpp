@@ -9,6 +9,7 @@
 
 #include "identify/candidates.hpp"
 #include "identify/fit.hpp"
+#include "identify/parallel.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -154,7 +155,31 @@ void set_scales(Problem& problem) {
   problem.speed08_mean = speed08 / n;
 }
 
+/// A rough search shows no more with more: chosen for speed, a day in bins of 10 s.
 constexpr std::size_t most_rough_bins = 8000;
+
+/// Time constants that motors have, with the rise that this log shows; a factor of ten either way.
+std::vector<Belief> guesses_of(const Problem& problem) {
+  double rise_K = 1;
+  for (const Bin& bin : problem.logs.front().bins) {
+    const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+    if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
+  }
+  std::vector<Belief> out;
+  for (const double housing_s : {120.0, 600.0, 2400.0}) {
+    for (const double ratio : {0.1, 0.6}) {
+      Belief b = problem.belief;
+      b.log_sd = 2.3;
+      b.log_room = 9;
+      b.R2_K_per_W = rise_K / std::max(1e-9, problem.heat_W);
+      b.R1_K_per_W = ratio * b.R2_K_per_W;
+      b.C2_J_per_K = housing_s / b.R2_K_per_W;
+      b.C1_J_per_K = 0.02 * housing_s / b.R1_K_per_W;
+      out.push_back(b);
+    }
+  }
+  return out;
+}
 
 /// Without a sheet: several guesses of the time constants, each fitted to the longest log, the best one kept. One log
 /// only, because several may differ in just what is to be found out.
@@ -164,11 +189,6 @@ void rough_search(Problem& whole) {
                                         [](const Bins& a, const Bins& b) { return a.duration_s() < b.duration_s(); });
   problem.logs = {merged(*longest, 1 + longest->bins.size() / most_rough_bins)};
 
-  double rise_K = 1;
-  for (const Bin& bin : longest->bins) {
-    const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
-    if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
-  }
   // A housing that answers at once is fitted best by both masses as one, and no motor is so.
   const auto centred_at = [](Belief belief, const Fit& f) {
     const auto believed = [](double value, const InCatalogues& share, double of) {
@@ -181,38 +201,28 @@ void rough_search(Problem& whole) {
     belief.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, belief.C2_J_per_K);
     return belief;
   };
-  Belief best, guess;
-  double least = 1e300;
-  bool beyond = false;
-  for (const double housing_s : {120.0, 600.0, 2400.0}) {
-    for (const double ratio : {0.1, 0.6}) {
-      Belief b = problem.belief;
-      b.log_sd = 2.3;  // a factor of ten either way
-      b.log_room = 9;
-      b.R2_K_per_W = rise_K / std::max(1e-9, problem.heat_W);
-      b.R1_K_per_W = ratio * b.R2_K_per_W;
-      b.C2_J_per_K = housing_s / b.R2_K_per_W;
-      b.C1_J_per_K = 0.02 * housing_s / b.R1_K_per_W;
-      problem.belief = b;
-      const Fit f = fit(problem, {});
-      if (f.cost >= least || !f.valid()) continue;
-      least = f.cost;
-      guess = b;
-      best = centred_at(b, f);
-      beyond = std::find(f.at_bound.begin(), f.at_bound.begin() + base_count, true) != f.at_bound.begin() + base_count;
-    }
-  }
-  if (least == 1e300) return;
+  const std::vector<Belief> guesses = guesses_of(problem);
+  std::vector<Fit> fits(guesses.size());
+  in_parallel(guesses.size(), [&](std::size_t i) {
+    Problem guessed = problem;
+    guessed.belief = guesses[i];
+    fits[i] = fit(guessed, {});
+  });
+  const auto least =
+      std::min_element(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
+  if (!least->valid()) return;
+  const Belief &guess = guesses[static_cast<std::size_t>(least - fits.begin())], best = centred_at(guess, *least);
   problem.belief = best;
   Fit alone = best_alone(problem);
-  if (beyond) {  // from where what is missing has bent two resistors to, no cause may find back
-    problem.belief = guess;
+  const auto bounds = least->at_bound.begin();
+  if (std::find(bounds, bounds + base_count, true) != bounds + base_count) {
+    problem.belief = guess;  // from where what is missing has bent two resistors to, no cause may find back
     Fit straight = best_alone(problem);
     if (straight.cost < alone.cost) alone = std::move(straight);
   }
   // By half: beyond recognition, by what is missing. Where any gain was enough, a log that hid nothing got a name
   // (score's motors, designed, dense, seed 17).
-  const bool bent = alone.cost < least / 2;
+  const bool bent = alone.cost < least->cost / 2;
   whole.belief = bent ? centred_at(best, alone) : best;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A motor that is nothing like ours, without a sheet: does what is found foretell the winding where it was not fitted?
-// For each seed a traction drive is recorded (traction.hpp); the first three quarters are fitted and chosen on, the
-// last is foretold.
-//   build/host/bin/traction --seeds 20 [--first 1] [--json]
+// For each seed drives of one motor are recorded (traction.hpp); the first three quarters of each are fitted and chosen
+// on, the last is foretold.
+//   build/host/bin/traction --seeds 20 [--first 1] [--drives 5] [--json]
 #include "tests/identify/traction.hpp"
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
@@ -20,7 +21,7 @@
 int main(int argc, char** argv) {
   // The promise for a measured drive of this kind: rms of the winding where nothing was fitted.
   constexpr double most_K = 4;
-  CLI::App app{"What identify foretells of traction drives of five masses"};
+  CLI::App app{"What identify foretells of traction motors of five masses"};
   int seeds = 20, drives = 1;
   std::uint64_t first = tests::rotating_seed();
   bool json = false;
@@ -35,10 +36,14 @@ int main(int argc, char** argv) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<double> before, after;
   int answered = 0, kept = 0, kept_by_two = 0;
+  double recorded_h = 0, worked_s = 0;  // by all cores
   for (int s = 0; s < seeds; ++s) {
     const std::uint64_t seed = first + static_cast<std::uint64_t>(s);
     const auto logs = tests::traction_drives(fmt::format("hotcore_traction_{}.csv", getpid()), seed, drives);
+    for (const identify::Log& log : logs) recorded_h += log.of(identify::Role::time).back() / 3600;
+    const std::clock_t begun = std::clock();
     const auto report = identify::discover(logs, std::nullopt, held);
+    worked_s += static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
     const double two_K = report.held_out->before.core_K, found_K = report.held_out->after.core_K;
     before.push_back(two_K);
     after.push_back(found_K);
@@ -54,11 +59,18 @@ int main(int argc, char** argv) {
   }
   const auto worst = [](const std::vector<double>& of) { return *std::max_element(of.begin(), of.end()); };
   if (json)
-    fmt::print("{}\n", nlohmann::ordered_json{{"answered", answered}, {"within", kept}, {"drives", list}}.dump(2));
+    fmt::print("{}\n", nlohmann::ordered_json{{"answered", answered},
+                                              {"within", kept},
+                                              {"recorded_h", recorded_h},
+                                              {"worked_s", worked_s},
+                                              {"motors", list}}
+                           .dump(2));
   else
     fmt::print(
-        "{} drives, {} answered; on the last quarter, not fitted, the winding is missed by {:.1f} K rms in the median "
-        "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {})\n",
+        "{} motors, {} answered; on the last quarter, not fitted, the winding is missed by {:.1f} K rms in the median "
+        "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {}); {:.0f} h, "
+        "{:.1f} s "
+        "of one core for each\n",
         seeds, answered, identify::median(after), worst(after), identify::median(before), worst(before), most_K, kept,
-        kept_by_two);
+        kept_by_two, recorded_h, worked_s / recorded_h);
 }
