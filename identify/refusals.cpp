@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
 #include "identify/filled.hpp"
+#include "identify/parallel.hpp"
 #include "identify/units.hpp"
 
 namespace identify {
@@ -92,7 +94,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
     return left + clearly < explained && left < fraction_left * as_it_stands;
   };
   const auto follows_better = [&](const std::vector<Log>& otherwise) {
-    const Problem read = problem_of(otherwise, motor);
+    const Problem read = rough(problem_of(otherwise, motor));
     return leaves_less(read, {}, by_one) || leaves_less(read, best_alone(read).chosen, by_one);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
@@ -106,7 +108,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
     // Of a unit that would prove nothing: a gain and an offset imitate Fahrenheit.
     const double explained = std::min(by_one, left_by(found.chosen.fit));
-    if (leaves_less(problem_of(swapped, motor), {}, explained))
+    if (leaves_less(rough(problem_of(swapped, motor)), {}, explained))
       return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
              "swapped; map them with --column.";
   }
@@ -165,15 +167,16 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
   double late_s = 0, least = fraction_left * excess(found.two_resistors);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
-  for (const double tried_s : {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s}) {
-    const std::vector<Log> apart = loaded_later(tried_s, problem, logs);
-    if (apart.empty()) continue;
-    const Fit f = fit(unseen_by(problem, apart), {clock});
-    const double left = excess(f);
-    if (left < least) {
-      least = left;
-      late_s = tried_s + f.x[coordinate_of(f, Edit::delay)];
-    }
+  const double tried_s[] = {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s};
+  Fit fits[std::size(tried_s)];
+  in_parallel(std::size(tried_s), [&](std::size_t i) {
+    const std::vector<Log> apart = loaded_later(tried_s[i], problem, logs);
+    if (!apart.empty()) fits[i] = fit(unseen_by(problem, apart), {clock});
+  });
+  for (std::size_t i = 0; i < std::size(tried_s); ++i) {
+    if (!fits[i].valid() || excess(fits[i]) >= least) continue;
+    least = excess(fits[i]);
+    late_s = tried_s[i] + fits[i].x[coordinate_of(fits[i], Edit::delay)];
   }
   return late_s;
 }
@@ -182,7 +185,7 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
 bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
                              const std::optional<wire::pc::MotorFile>& motor) {
   for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
-  return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
+  return excess(best_alone(rough(problem_of(logs, motor)))) < excess(fit(problem, best.chosen, {&best}));
 }
 
 /// As it was told last, and as it is told next, where that is not now.
