@@ -156,6 +156,9 @@ void set_scales(Problem& problem) {
   problem.speed08_mean = speed08 / n;
 }
 
+/// Where a search begins is seen in no more, of ten hours in bins of 4.5 s: chosen for speed.
+constexpr std::size_t most_rough_bins = 8000;
+
 /// Time constants that motors have, with the rise that this log shows; a factor of ten either way.
 std::vector<Belief> guesses_of(const Problem& problem) {
   double rise_K = 1;
@@ -184,9 +187,8 @@ std::vector<Belief> guesses_of(const Problem& problem) {
 void rough_search(Problem& whole) {
   const auto longest = std::max_element(whole.logs.begin(), whole.logs.end(),
                                         [](const Bins& a, const Bins& b) { return a.duration_s() < b.duration_s(); });
-  Problem one = whole;
-  one.logs = {*longest};
-  Problem problem = rough(std::move(one));
+  Problem problem = whole;
+  problem.logs = {merged(*longest, 1 + longest->bins.size() / most_rough_bins)};
   // A housing that answers at once is fitted best by both masses as one, and no motor is so.
   const auto centred_at = [](Belief belief, const Fit& f) {
     const auto believed = [](double value, const InCatalogues& share, double of) {
@@ -227,7 +229,7 @@ void rough_search(Problem& whole) {
 /// A sensor that feels the winding shows how its temperature bends within a bin: an eighth of the winding's time
 /// constant where that, by a fit with such a sensor, is evidence that a further cause could be named on; else infinite.
 double felt_winding_bin_s(const Problem& problem) {
-  const Fit felt = fit(rough(problem), {{cause_named("sensor_placement"), -1}});
+  const Fit felt = fit(problem, {{cause_named("sensor_placement"), -1}});
   if (!felt.valid()) return std::numeric_limits<double>::infinity();
   const Physical p = physical(felt.x);
   const double ohm = problem.heated_by_power() ? 1 : problem.belief.ohm, share = felt.x[base_count];
@@ -425,14 +427,6 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
     warm_phases_unequally(problem);
     allow_for_noisy_current(problem);
   }
-  return problem;
-}
-
-Problem rough(Problem problem) {
-  constexpr std::size_t most_bins = 8000;
-  std::size_t bins = 0;
-  for (const Bins& log : problem.logs) bins += log.bins.size();
-  for (Bins& log : problem.logs) log = merged(log, 1 + bins / most_bins);
   return problem;
 }
 

@@ -81,10 +81,6 @@ struct Problem {
 Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
                    std::optional<double> copper_per_K = std::nullopt);
 
-/// For what only says where to begin, how fine to look, or that a reading is none: no more bins than that, chosen for
-/// speed (10 h in bins of 4.5 s). Leeways are not taken along.
-Problem rough(Problem problem);
-
 /// Each log without its last `fraction`; and each whole, but with the readings of that part alone.
 Problem first_part(const Problem& problem, double fraction);
 Problem last_part(const Problem& problem, double fraction);

@@ -94,7 +94,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
     return left + clearly < explained && left < fraction_left * as_it_stands;
   };
   const auto follows_better = [&](const std::vector<Log>& otherwise) {
-    const Problem read = rough(problem_of(otherwise, motor));
+    const Problem read = problem_of(otherwise, motor);
     return leaves_less(read, {}, by_one) || leaves_less(read, best_alone(read).chosen, by_one);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
@@ -108,7 +108,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
     for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
     // Of a unit that would prove nothing: a gain and an offset imitate Fahrenheit.
     const double explained = std::min(by_one, left_by(found.chosen.fit));
-    if (leaves_less(rough(problem_of(swapped, motor)), {}, explained))
+    if (leaves_less(problem_of(swapped, motor), {}, explained))
       return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
              "swapped; map them with --column.";
   }
@@ -185,7 +185,7 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
 bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
                              const std::optional<wire::pc::MotorFile>& motor) {
   for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
-  return excess(best_alone(rough(problem_of(logs, motor)))) < excess(fit(problem, best.chosen, {&best}));
+  return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
 }
 
 /// As it was told last, and as it is told next, where that is not now.
