@@ -634,7 +634,7 @@ TEST(Search, NoCauseStaysInAPoorValleyThatTwoResistorsHaveLeft) {
   // A board that heats the housing six times as much as copper does. A cause may do nothing, and then costs its prior.
   const Hidden h = hidden({.duty = tests::Duty::designed, .seed = 50004132, .effects = {"board_heat"}});
   for (const identify::Candidate& single : identify::search(h.problem).singles)
-    EXPECT_GT(single.gain, -20) << identify::names_of(single.fit.chosen).front() << "; six had -578 to -625";
+    EXPECT_GT(single.gain, -20) << identify::names_of(single.fit.chosen).front() << "; seven had -578 to -625";
 }
 
 TEST(Search, WindingAndHousingAreNotExchangedWhereTheSheetIsFarOff) {

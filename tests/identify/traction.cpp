@@ -69,8 +69,8 @@ int main(int argc, char** argv) {
     fmt::print(
         "{} motors, {} answered; on the last quarter, not fitted, the winding is missed by {:.1f} K rms in the median "
         "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {}); {:.0f} h, "
-        "{:.1f} s "
-        "of one core for each\n",
+        "each "
+        "of {:.1f} s on one core\n",
         seeds, answered, identify::median(after), worst(after), identify::median(before), worst(before), most_K, kept,
         kept_by_two, recorded_h, worked_s / recorded_h);
 }
