@@ -68,9 +68,8 @@ int main(int argc, char** argv) {
   else
     fmt::print(
         "{} motors, {} answered; on the last quarter, not fitted, the winding is missed by {:.1f} K rms in the median "
-        "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {}); {:.0f} h, "
-        "each "
-        "of {:.1f} s on one core\n",
+        "({:.1f} at worst; two resistors: {:.1f} and {:.1f}), by {:g} or less in {} (two resistors: {})\n"
+        "{:.0f} h, each of {:.1f} s on one core\n",
         seeds, answered, identify::median(after), worst(after), identify::median(before), worst(before), most_K, kept,
         kept_by_two, recorded_h, worked_s / recorded_h);
 }
