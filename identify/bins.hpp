@@ -23,7 +23,7 @@ namespace identify {
 /// Amplitude of the current vector over the direct current that heats alike.
 inline const double amplitude_per_direct = 2 / std::sqrt(3.0);
 inline constexpr double stalled_rad_per_s = 2;  // about three seconds a turn
-inline constexpr double longest_bin_s = 2;  // but of many hours under a slow winding (problem.cpp)
+inline constexpr double longest_bin_s = 2;      // but of many hours under a slow winding (problem.cpp)
 
 /// Of a coarse sensor's step: how well its moment is known at worst (search.cpp asks the residual for better). Noise of
 /// 0 to 0.4 of it leaves readings 0.02 to 0.12 off (Masks.ASensorOfWholeDegreesIsReadAsItSteps holds them to this).
