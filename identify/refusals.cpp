@@ -71,6 +71,17 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
 /// What a fit misses over what noise alone would leave.
 double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
 
+/// Nonsense is nonsense in long bins too: of what leaves more than `look_share` of what two resistors do there, or all
+/// there is in a log of 20 min, no more is asked. Twice what is asked in the end.
+constexpr std::size_t look_bins = 4000;
+constexpr double look_share = 2 * fraction_left;
+Problem in_long_bins(Problem problem) {
+  std::size_t bins = 0;
+  for (const Bins& log : problem.logs) bins += log.bins.size();
+  for (Bins& log : problem.logs) log = merged(log, 1 + bins / look_bins);
+  return problem;
+}
+
 /// The logs with these columns read in this unit.
 std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::vector<Log> logs) {
   for (Log& log : logs) {
@@ -89,7 +100,10 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
   const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
   const Fit& two = found.two_resistors;
   const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
+  const double in_a_look = excess(fit(in_long_bins(problem), {}, {&two}));
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
+    const Fit look = fit(in_long_bins(read), chosen);
+    if (!look.valid() || excess(look) > look_share * in_a_look) return false;
     const double left = excess(fit(read, chosen));
     return left + clearly < explained && left < fraction_left * as_it_stands;
   };
@@ -167,11 +181,15 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
   double late_s = 0, least = fraction_left * excess(found.two_resistors);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
+  const double in_a_look = excess(fit(in_long_bins(problem), {}, {&found.two_resistors}));
   const double tried_s[] = {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s};
   Fit fits[std::size(tried_s)];
   in_parallel(std::size(tried_s), [&](std::size_t i) {
-    const std::vector<Log> apart = loaded_later(tried_s[i], problem, logs);
-    if (!apart.empty()) fits[i] = fit(unseen_by(problem, apart), {clock});
+    const std::vector<Log> moved = loaded_later(tried_s[i], problem, logs);
+    if (moved.empty()) return;
+    const Problem apart = unseen_by(problem, moved);
+    const Fit look = fit(in_long_bins(apart), {clock});
+    if (look.valid() && excess(look) < look_share * in_a_look) fits[i] = fit(apart, {clock});
   });
   for (std::size_t i = 0; i < std::size(tried_s); ++i) {
     if (!fits[i].valid() || excess(fits[i]) >= least) continue;
@@ -185,7 +203,11 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
 bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
                              const std::optional<wire::pc::MotorFile>& motor) {
   for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
-  return excess(best_alone(problem_of(logs, motor))) < excess(fit(problem, best.chosen, {&best}));
+  const Problem swapped = problem_of(logs, motor);
+  const auto left_by_best = [&](const Problem& p) { return excess(fit(p, best.chosen, {&best})); };
+  const double in_a_look = left_by_best(in_long_bins(problem));
+  return excess(best_alone(in_long_bins(swapped))) < in_a_look + std::abs(in_a_look) + clearly &&
+         excess(best_alone(swapped)) < left_by_best(problem);
 }
 
 /// As it was told last, and as it is told next, where that is not now.
