@@ -7,6 +7,7 @@
 
 #include "boards/h8-15d/heat_keeper.hpp"
 #include "tests/chip/image.hpp"
+#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -69,6 +70,7 @@ void spoil_backup(Pcb& pcb) {
 }
 
 TEST(Memory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   for (const int hang : {0, 16 + 18}) {  // main loop: IWDG; fast lane: WWDG
     auto pcb = small_motors(heard_s);
@@ -90,6 +92,7 @@ TEST(Memory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
 }
 
 TEST(Memory, APowerCutOf2sInABurstForgetsNoHeatWithOrWithoutABattery) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   for (const bool battery : {true, false}) {
     auto pcb = small_motors(heard_s);
@@ -107,6 +110,7 @@ TEST(Memory, APowerCutOf2sInABurstForgetsNoHeatWithOrWithoutABattery) {
 }
 
 TEST(Memory, TwentyQuickPowerCyclesDoNotAddUpToABurntWinding) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   auto pcb = small_motors(heard_s);
   ASSERT_TRUE(pcb->arm());
@@ -148,6 +152,7 @@ TEST(Memory, ASpoiltBackupMemoryFallsBackOnTheJournalWhichCountsForOneStartOnly)
 }
 
 TEST(Memory, WithNothingRememberedTheStartIsHotAndAHotMotorStaysWhole) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   auto pcb = small_motors(heard_s);
   ASSERT_TRUE(pcb->arm());
@@ -217,6 +222,7 @@ TEST(Memory, ParametersAreSavedOnlyDisarmedAndAreInForceAfterARestart) {
 }
 
 TEST(Memory, APowerCutInEachWordOfAParameterSaveLeavesTheLastSetOrTheOneBefore) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   int kept_old = 0, kept_new = 0;
   for (int cut = 1; cut <= 92; ++cut) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "tests/chip/plugged.hpp"
+#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -152,6 +153,7 @@ TEST(UsbMutation, TheHealthyImagePassesTheExamination) {
 }
 
 TEST(UsbMutation, AlmostEveryMistakeInTheUsbDriverIsCaught) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   NEEDS_IMAGE(image);
   int caught = 0, all = 0;
   for (const Mutation& m : mutations()) {

@@ -22,7 +22,7 @@
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/says.hpp"
-#include "tests/identify/slow_build.hpp"
+#include "tests/slow_build.hpp"
 #include "tests/identify/traction.hpp"
 
 namespace {
@@ -132,6 +132,7 @@ TEST(Report, TwoEntriesOfOneIdAreToldApart) {
 }
 
 TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions fitted, held_out;
   for (auto* o : {&fitted, &held_out}) o->core_every_s = 20;
   held_out.seed = 2;
@@ -342,6 +343,7 @@ TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
 }
 
 TEST(BadInput, ALoadThatNeverChanges) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto as_it_is = [](auto&, int) { return true; };
   tests::BenchOptions options;
   options.current_A = [](double, std::mt19937_64&) { return 2.0; };
@@ -363,6 +365,7 @@ TEST(BadInput, NoTemperatureBeforeWhatIsHeldOut) {
 }
 
 TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   // A housing of twenty minutes over five: a third mass was named of a sensor that feels the winding.
   tests::HiddenLogOptions o;
   o.core = tests::Core::none;
@@ -402,6 +405,7 @@ TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
 }
 
 TEST(BadInput, TimeInMinutes) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
   const Outcome r = run(spoilt(in_min) + " --explain");
   says(r.out, "Verdict: insufficient");
@@ -410,6 +414,7 @@ TEST(BadInput, TimeInMinutes) {
 }
 
 TEST(BadInput, TheSheetOfAnotherMotor) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto as_it_is = [](auto&, int) { return true; };
   const Outcome near = run(spoilt(as_it_is) + " --motor ec-powermax-30-48v");
   says(near.out, "times the sheet's; see whether maxon EC-powermax 30");
@@ -544,6 +549,7 @@ TEST(BadInput, ATemperatureReadEightTimes) {
 }
 
 TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const Outcome r = run(spoilt([](auto& row, int) { return row[2] = "", true; }) + " --motor ec-16-40w --explain");
   EXPECT_EQ(r.code, 0);
   says(r.out, "Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, ");
@@ -553,6 +559,7 @@ TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
 }
 
 TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.power_gain = 1;
   auto logs = tests::bench_logs({options});
@@ -615,6 +622,7 @@ TEST(BadInput, CurrentAndSpeedSwapped) {
 }
 
 TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLog) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto speed_rad_per_s = [](double t) { return std::fmod(t, 200) < 100 ? 2 : 0.5; };
   tests::BenchOptions options;
   options.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 130) < 60 ? 0.4 : 0.1; };
@@ -768,6 +776,7 @@ TEST(Program, BadDataEndsWithThreeAndWritesNothing) {
 }
 
 TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const std::string model = (std::filesystem::temp_directory_path() / "hotcore_no_model.toml").string();
   const auto asked = [&](const tests::BenchOptions& options) {
     std::filesystem::remove(model);
@@ -854,6 +863,7 @@ TEST(Program, ColumnsMayFollowOneWord) {
 }
 
 TEST(Program, AScoreEndsWithWhatWasTakenForWhat) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   tests::BenchOptions options;
   options.core_every_s = 20;
   const std::string clean = tests::write_bench_log("hotcore_scored.csv", options);
