@@ -195,9 +195,14 @@ void rough_search(Problem& whole) {
       return std::clamp(value, share.least / beyond_catalogues * of, share.most * beyond_catalogues * of);
     };
     const Physical p = physical(f.x);
-    belief.R2_K_per_W = p.R2_K_per_W;
+    const Eigen::VectorXd unsure = f.covariance(false).diagonal();
+    // Of R1 and R2 the one less known is moved: cooling that another heat hides has no R2, and R1 with it would glow.
+    belief.R2_K_per_W = unsure[1] < unsure[0]
+                            ? p.R2_K_per_W
+                            : std::clamp(p.R2_K_per_W, p.R1_K_per_W / (R1_of_R2.most * beyond_catalogues),
+                                         p.R1_K_per_W / (R1_of_R2.least / beyond_catalogues));
     belief.C2_J_per_K = std::max(p.C2_J_per_K, p.C1_J_per_K / (C1_of_C2.most * beyond_catalogues));
-    belief.R1_K_per_W = believed(p.R1_K_per_W, R1_of_R2, p.R2_K_per_W);
+    belief.R1_K_per_W = believed(p.R1_K_per_W, R1_of_R2, belief.R2_K_per_W);
     belief.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, belief.C2_J_per_K);
     return belief;
   };

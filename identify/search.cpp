@@ -358,21 +358,20 @@ void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   if (out.verdict == Verdict::adequate) mark_likelier(judged, margins, out);
   // A winding read all the time shows R1 itself; one read now and then is outvoted by the housing.
   if (judged.noise.core_slow_K == 0) judged.leeway.push_back(leeway_of_load(judged, out.base.fit));
-  // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
-  const auto refit = [&](Fit& f) {
+  std::vector<Fit*> handed_on = {&out.base.fit, &out.chosen.fit};
+  for (std::vector<Candidate>* candidates : {&out.sets, &out.singles}) {
+    for (Candidate& c : *candidates) {
+      if (c.tied) handed_on.push_back(&c.fit);
+    }
+  }
+  in_parallel(handed_on.size(), [&](std::size_t i) {
+    Fit& f = *handed_on[i];
     const Problem less = believed_less(judged, f, 1);
+    // From the sheet as well: where the search ended may be a poor valley, and a board would believe it.
     Fit anew = fit(less, f.chosen);
     f = fit(less, f.chosen, {&f});
     if (anew.valid() && (!f.valid() || anew.cost < f.cost)) f = std::move(anew);
-  };
-  refit(out.base.fit);
-  refit(out.chosen.fit);
-  for (Candidate& c : out.sets) {
-    if (c.tied) refit(c.fit);
-  }
-  for (Candidate& c : out.singles) {
-    if (c.tied) refit(c.fit);
-  }
+  });
 }
 
 }  // namespace
@@ -403,6 +402,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const auto all = available(problem, without);
   doing("fitting each cause alone");
   out.two_resistors = fit(problem, {});
+  if (!out.two_resistors.valid()) return out;
   problem.leeway = ordinary_leeway(problem, out.two_resistors);
   fit_alone_and_settle_noise(problem, out.two_resistors, all, margins, field, out);
   out.base = out.chosen = field.base;

@@ -84,7 +84,8 @@ struct Search {
   std::vector<std::string> steps;  // the reasoning in plain words
 };
 
-/// `without`: ids left out of the table (tests take the truth away and expect "unknown").
+/// `without`: ids left out of the table (tests take the truth away and expect "unknown"). Insufficient where no motor
+/// near what is believed can be simulated.
 Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {},
               const Tell& doing = tell_nobody);
 
