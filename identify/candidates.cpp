@@ -113,11 +113,21 @@ std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chos
   std::erase_if(fits, [](const Fit& f) { return !f.valid(); });
   double most = 0;
   for (const Fit& f : fits) most = std::max(most, rough_base.fit.surprise() - f.surprise());
+  // Where the winding bends within such a bin, a short delay is lost in it.
+  const Physical motor = physical(base.fit.x);
+  const bool bends = rough.logs.front().width_s > motor.R1_K_per_W * motor.C1_J_per_K / 4;
   std::vector<Candidate> out(fits.size());
   in_parallel(fits.size(), [&](std::size_t i) {
     out[i] = candidate(rough_base, std::move(fits[i]));
-    if (!shorter || out[i].gain < most - look_errs - look_errs_share * most) return;
-    Fit whole = fit(problem, out[i].fit.chosen, {&out[i].fit});
+    if (!shorter) return;
+    const std::vector<Chosen> chosen = out[i].fit.chosen;
+    Fit whole;
+    if (out[i].gain >= most - look_errs - look_errs_share * most) whole = fit(problem, chosen, {&out[i].fit});
+    if (bends && cause_of(chosen.front()).edit == Edit::delay) {
+      const Fit prompt = with_cause(base.fit, cause_of(chosen.front()).id, {0.0});
+      Fit late = fit(problem, chosen, {&prompt});
+      if (late.cost < whole.cost) whole = std::move(late);
+    }
     if (whole.valid()) out[i] = candidate(base, std::move(whole));
   });
   sort(out);

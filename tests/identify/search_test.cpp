@@ -146,6 +146,9 @@ TEST(Search, ADelayOfAFastWindingIsFoundPastTheValleysOfOtherBursts) {
   o.seed = 963354;  // a time constant of 0.6 s
   o.effects = {"clock_delay"};
   expect_named(o, "unknown, for a delay of 2.7 s instead of 10.6");
+  o.seed = 63001354;  // 0.8 s
+  EXPECT_EQ(identify::search(hidden(o).problem).tied, (std::vector<std::vector<std::string>>{{"clock_delay"}}))
+      << "unknown, for a delay of 0.2 s that was lost in the bins of a look";
 }
 
 /// Of a winding read 0.02 s after the current of its row, ten rows a second.
