@@ -403,7 +403,7 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
       return {{0.05}, {0.6}};
     case Edit::mass:
     case Edit::hot_spot:  // ln of capacity and resistance: the time constant goes by half of what the capacity goes
-      for (const double shift : {0.0, -2.0}) out.push_back({nothing + shift, c[at + 1].start - shift / 2});
+      for (const double shift : {0.0, -2.0, 2.0}) out.push_back({nothing + shift, c[at + 1].start - shift / 2});
       return out;
     default:
       return {{nothing + 0.1 * c[at].sd}};

@@ -151,6 +151,12 @@ TEST(Search, ADelayOfAFastWindingIsFoundPastTheValleysOfOtherBursts) {
       << "unknown, for a delay of 0.2 s that was lost in the bins of a look";
 }
 
+TEST(Search, AHotSpotIsFoundPastTheValleyOfAFasterOne) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  expect_named({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 65011487, .effects = {"hot_spot"}},
+               "a tie of it with third_mass and with copper_coefficient");
+}
+
 /// Of a winding read 0.02 s after the current of its row, ten rows a second.
 TEST(Search, WhenInItsRowAWindingWasReadIsNoDelay) {
   const identify::Chosen delay{identify::cause_named("clock_delay"), -1};
