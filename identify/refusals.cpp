@@ -71,8 +71,8 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
 /// What a fit misses over what noise alone would leave.
 double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
 
-/// Nonsense is nonsense in long bins too: of what leaves more than `look_share` of what two resistors do there, or all
-/// there is in a log of 20 min, no more is asked. Twice what is asked in the end.
+/// Nonsense is nonsense in long bins too: a reading that leaves more than `look_share` there of what two resistors
+/// leave is not tried any further. Twice what is asked in the end; a log of 20 min has hardly more bins.
 constexpr std::size_t look_bins = 4000;
 constexpr double look_share = 2 * fraction_left;
 Problem in_long_bins(Problem problem) {
