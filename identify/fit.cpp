@@ -327,13 +327,13 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   double cost = cost_at(x, now), damping = 1e-3;
   if (cost == impossible) return out;
   Parabola here(c, x, now);
-  for (bool stuck = false;;) {
+  for (int in_vain = 0;;) {
     // In log-likelihood, so little that it changes no decision; of a model that misses by more than noise as much more.
     const double enough = 0.005 * std::max(1.0, 2 * now.misfit / std::max(1, now.readings));
     const Eigen::VectorXd newton = here.step_against(here.gradient, 0);
     out.promise = -0.5 * here.gradient.dot(newton);  // Newton decrement: what a full step still promises
     out.settled = out.promise < enough;
-    if (out.settled || stuck || out.iterations == most) break;
+    if (out.settled || in_vain == 2 || out.iterations == most) break;
     ++out.iterations;
     const double before = cost;
     bool better = false;
@@ -368,7 +368,8 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
       std::swap(now, trial);
     }
     here = Parabola(c, x, now);
-    stuck = before - cost < enough / 10;  // at a kink: the moment of a cooling_change falls into another bin
+    // Twice: at a kink, where the moment of a cooling_change falls into another bin. Once, a step may just be short.
+    in_vain = before - cost < enough / 10 ? in_vain + 1 : 0;
   }
   out.narrowing = narrowing(here.curvature, c, here.held);
   for (std::size_t i = 0; i < problem.leeway.size(); ++i)
