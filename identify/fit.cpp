@@ -387,7 +387,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   return out;
 }
 
-/// Where a cause starts whose parameters stand from `at` on: near nothing, and once far from it where it is nonlinear
+/// Where a cause starts whose parameters stand from `at` on: near nothing, and farther from it where it is nonlinear
 /// in them and has more than one valley.
 std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector<Coordinate>& c, std::size_t at) {
   const double nothing = c[at].start;

@@ -82,6 +82,11 @@ Problem in_long_bins(Problem problem) {
   return problem;
 }
 
+/// What two resistors leave there.
+double left_in_a_look(const Problem& problem, const Search& found) {
+  return excess(fit(in_long_bins(problem), {}, {&found.two_resistors}));
+}
+
 /// The logs with these columns read in this unit.
 std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::vector<Log> logs) {
   for (Log& log : logs) {
@@ -100,7 +105,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
   const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
   const Fit& two = found.two_resistors;
   const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
-  const double in_a_look = excess(fit(in_long_bins(problem), {}, {&two}));
+  const double in_a_look = left_in_a_look(problem, found);
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
     const Fit look = fit(in_long_bins(read), chosen);
     if (!look.valid() || excess(look) > look_share * in_a_look) return false;
@@ -181,7 +186,7 @@ double clocks_apart_s(const Problem& problem, const Search& found, const std::ve
   double late_s = 0, least = fraction_left * excess(found.two_resistors);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
-  const double in_a_look = excess(fit(in_long_bins(problem), {}, {&found.two_resistors}));
+  const double in_a_look = left_in_a_look(problem, found);
   const double tried_s[] = {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s};
   Fit fits[std::size(tried_s)];
   in_parallel(std::size(tried_s), [&](std::size_t i) {
