@@ -18,7 +18,7 @@
 namespace boards::host {
 namespace {
 
-[[noreturn]] void refuse(const std::string& sentence) { throw wire::pc::UserError(wire::pc::Exit::usage, sentence); }
+using wire::pc::refuse;
 
 void known_keys(const std::string& place, const toml::table& table, const std::vector<std::string>& known) {
   for (const auto& [key, node] : table) {

@@ -18,8 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using wire::pc::did_you_mean;
-
-[[noreturn]] void refuse(const std::string& sentence) { throw wire::pc::UserError(wire::pc::Exit::usage, sentence); }
+using wire::pc::refuse;
 
 constexpr std::pair<const char*, Limiter> limiter_names[] = {{"governor", Limiter::governor},
                                                              {"rated", Limiter::rated},
@@ -68,7 +67,7 @@ void read_table(const std::string& place, const toml::table& table, const Slots&
 }
 
 // Bounds are what the numerics were tried with, not what is wise: a day, the boiling point of solder, a large robot.
-constexpr double day_s = 86400, hottest_degC = 300, most_A = 200;
+constexpr double day_s = 86400, highest_degC = 300, most_A = 200;
 
 struct Reader {
   Scene scene;
@@ -86,8 +85,8 @@ struct Reader {
              {"log_Hz", {&s.log_Hz, 0.1, 20000}},
              {"seed", {&seed, 0, 4294967295.0}},
              {"ambient_degC", {&s.ambient_degC, -40, 100}},
-             {"start_degC", {&s.start_degC, -40, hottest_degC}},
-             {"housing_limit_degC", {&s.housing_limit_degC, 0, hottest_degC}},
+             {"start_degC", {&s.start_degC, -40, highest_degC}},
+             {"housing_limit_degC", {&s.housing_limit_degC, 0, highest_degC}},
              {"coolant_K_per_W", {&s.coolant_K_per_W, 0, 100}},
              {"supply_V", {&s.supply_V, 5, 100}},
              {"supply_sinks", {&supply_sinks, 0, 1}}},

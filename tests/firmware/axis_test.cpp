@@ -52,13 +52,12 @@ struct AxisProbe {
 
 namespace {
 
+using bench::nan;
 using firmware::AxisProbe;
 using firmware::Mode;
 using wire::Fault;
 using wire::Limit;
 using wire::Status;
-
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 /// A driver whose first axis runs a bench motor; the second stays off unless a test uses it.
 struct Rig {

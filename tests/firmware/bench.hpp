@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "boards/dual_48v_20a.hpp"
 #include "firmware/driver.hpp"
@@ -13,6 +14,7 @@
 namespace bench {
 
 inline constexpr double period_s = 1.0 / 20e3;
+inline constexpr float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
 inline constexpr firmware::BoardRating rating = boards::dual_48V_20A;
 
 /// EC-powermax class, 48 V winding.

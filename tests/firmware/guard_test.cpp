@@ -4,18 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "tests/firmware/bench.hpp"
 
 namespace {
 
+using bench::inf;
+using bench::nan;
 using firmware::Guard;
 using firmware::Verdict;
 using wire::Fault;
-
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float inf = std::numeric_limits<float>::infinity();
 
 /// A guard that has seen good samples up to number 10.
 Guard warm() {

@@ -13,12 +13,12 @@
 
 namespace {
 
+using bench::inf;
+using bench::nan;
 using firmware::Event;
 using firmware::Mode;
 using wire::Limit;
 using wire::Status;
-
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 struct Asking {
   Asking() {
@@ -110,7 +110,6 @@ TEST(Setpoint, GarbageIsRefusedAndDoesNotCountAsFresh) {
   s.configure(bench::parameters(), bench::rating);
   ASSERT_EQ(s.set({1.0f, 2.0f}), Status::done);
   s.follow(1);
-  const float inf = std::numeric_limits<float>::infinity();
   for (int i = 0; i < 3000; ++i) {
     for (const float bad : {nan, inf, -inf, 1e38f, -1000.1f}) {
       EXPECT_EQ(s.set({bad, 0.0f}), Status::not_a_current);

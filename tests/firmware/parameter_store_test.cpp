@@ -199,12 +199,12 @@ TEST(ParameterStore, TheTemperaturesSurviveACommit) {
 /// In a room of 25 degC, which the housing proved though 40 degC are believed without it.
 TEST(ParameterStore, AnUnrelatedParameterTouchesNoEstimateAndAnotherModelIsBegunHot) {
   const firmware::AxisSetup setup = firmware::setup_from(sheet_set());
-  struct Event {
+  struct Change {
     std::uint16_t id;
     float value;
     bool heat;
   };
-  for (const Event event : {Event{0x0111, 12.0f, false}, Event{0x0201, 0.25f, true}, Event{0x0101, 0.6f, true}}) {
+  for (const Change change : {Change{0x0111, 12.0f, false}, Change{0x0201, 0.25f, true}, Change{0x0101, 0.6f, true}}) {
     Bench saved;
     saved.put_in_force();
     ASSERT_EQ(saved.store.save(saved.driver, saved.flash).status, 0);
@@ -224,17 +224,17 @@ TEST(ParameterStore, AnUnrelatedParameterTouchesNoEstimateAndAnotherModelIsBegun
     const thermal::Estimate before[] = {estimate(0), estimate(1)};
     ASSERT_LT(before[0].hottest_degC(), 26.0);
 
-    ASSERT_EQ(store.stage({{event.id, 0}, event.value}).status, 0);
+    ASSERT_EQ(store.stage({{change.id, 0}, change.value}).status, 0);
     ASSERT_EQ(store.commit(driver).status, 0);
     EXPECT_EQ(estimate(1).hottest_degC(), before[1].hottest_degC()) << "of the other axis nothing was asked";
-    if (event.heat) {
-      EXPECT_GE(estimate(0).hottest_degC(), 40.0) << event.id;
+    if (change.heat) {
+      EXPECT_GE(estimate(0).hottest_degC(), 40.0) << change.id;
       continue;
     }
     EXPECT_EQ(estimate(0).hottest_degC(), before[0].hottest_degC());
     EXPECT_EQ(estimate(0).sigma_K[0], before[0].sigma_K[0]);
     live(1);
-    EXPECT_EQ(driver.axis(0).state().allowance_A, event.value);
+    EXPECT_EQ(driver.axis(0).state().allowance_A, change.value);
   }
 }
 

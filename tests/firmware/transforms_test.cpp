@@ -114,8 +114,8 @@ TEST(Rotor, AnEncoderOf4096CountsLeavesTheSpeedQuietAndTheAngleAhead) {
   firmware::Rotor rotor(bench::parameters(), bench::rating);
   double mechanical = 0.0, worst_speed = 0.0;
   for (int i = 0; i < 20000; ++i, mechanical += 123.4 * bench::period_s) {
-    const double count = 2 * M_PI / 4096;
-    (void)rotor.follow(static_cast<float>(std::floor(wrapped(mechanical) / count) * count), 1);
+    const double count_rad = 2 * M_PI / 4096;
+    (void)rotor.follow(static_cast<float>(std::floor(wrapped(mechanical) / count_rad) * count_rad), 1);
     if (i > 2000) worst_speed = std::max(worst_speed, std::abs(static_cast<double>(rotor.rad_per_s()) - 123.4));
   }
   EXPECT_LT(worst_speed, 12.0);  // half a count on the observer's gain is 10 rad/s

@@ -18,7 +18,7 @@ using host_sim::Load;
 using host_sim::SensorDesign;
 using plant_tests::period_s;
 
-constexpr std::array<hal::Duty, 2> released = {hal::Duty{{0, 0, 0}, false}, hal::Duty{{0, 0, 0}, false}};
+constexpr std::array<hal::Duty, 2> both_released = {hal::Duty{{0, 0, 0}, false}, hal::Duty{{0, 0, 0}, false}};
 
 BenchDesign quiet() {
   BenchDesign design = plant_tests::bench_design(plant_tests::small_motor());
@@ -31,7 +31,7 @@ BenchDesign quiet() {
 void spin(Bench& bench, double speed_rad_per_s, double seconds) {
   bench.load(0).mode = Load::Mode::imposed_speed;
   bench.load(0).speed_rad_per_s = speed_rad_per_s;
-  for (int n = 0; n < seconds / period_s; ++n) bench.advance_period(released);
+  for (int n = 0; n < seconds / period_s; ++n) bench.advance_period(both_released);
 }
 
 TEST(Converter, RoundsAndClampsAndReadsNonsenseAsBroken) {
@@ -64,7 +64,7 @@ TEST(CurrentChain, CountsStandForAmperesWithGainAndOffset) {
   EXPECT_EQ(bench.raw(0).current_counts[0], 2048);
   EXPECT_NEAR(bench.raw(0).current_counts[2], 2048 + 0.5 / design.sensors.current_A_per_count, 0.5);
   bench.load(0).mode = Load::Mode::locked;
-  const std::array<hal::Duty, 2> push = {hal::Duty{{0.5f, 0.6f, 0.4f}, true}, released[1]};
+  const std::array<hal::Duty, 2> push = {hal::Duty{{0.5f, 0.6f, 0.4f}, true}, both_released[1]};
   for (int n = 0; n < 50; ++n) bench.advance_period(push);
   const auto amps = bench.truth(0).current_A;
   EXPECT_GT(amps[1], 3);
@@ -75,7 +75,7 @@ TEST(CurrentChain, CountsStandForAmperesWithGainAndOffset) {
 TEST(CurrentChain, SaturatesAtBothRails) {
   Bench bench(quiet(), 1);
   bench.load(0).mode = Load::Mode::locked;
-  const std::array<hal::Duty, 2> shove = {hal::Duty{{0, 1, 0.5f}, true}, released[1]};
+  const std::array<hal::Duty, 2> shove = {hal::Duty{{0, 1, 0.5f}, true}, both_released[1]};
   for (int n = 0; n < 50; ++n) bench.advance_period(shove);
   ASSERT_GT(bench.truth(0).current_A[1], 41);
   EXPECT_EQ(bench.raw(0).current_counts[1], 4095);
@@ -113,7 +113,7 @@ TEST(BusChain, ReadsVoltsAndTheAmperesThatTheBridgesTake) {
   const BenchDesign design = quiet();
   Bench bench(design, 1);
   bench.load(0).mode = Load::Mode::locked;
-  for (int n = 0; n < 400; ++n) bench.advance_period({hal::Duty{{0.7f, 0.4f, 0.4f}, true}, released[1]});
+  for (int n = 0; n < 400; ++n) bench.advance_period({hal::Duty{{0.7f, 0.4f, 0.4f}, true}, both_released[1]});
   double supply_A = bench.supply_A();
   ASSERT_GT(supply_A, 3);
   const host_sim::BoardRaw& raw = bench.board_raw();
@@ -121,7 +121,7 @@ TEST(BusChain, ReadsVoltsAndTheAmperesThatTheBridgesTake) {
               0.05);
   EXPECT_NEAR(raw.bus_voltage_counts * design.sensors.bus_V_per_count, bench.bus_V(), 0.01);
   // The filter: a millisecond after the current has stopped a third of the reading is left.
-  for (int n = 0; n < 20; ++n) bench.advance_period(released);
+  for (int n = 0; n < 20; ++n) bench.advance_period(both_released);
   EXPECT_NEAR((raw.bus_current_counts - design.sensors.bus_zero_counts) * design.sensors.bus_A_per_count / supply_A,
               std::exp(-1), 0.15);
 }
@@ -145,7 +145,7 @@ TEST(Hall, ShowsSixSectorsInOrder) {
   bench.load(0).mode = Load::Mode::imposed_speed;
   bench.load(0).speed_rad_per_s = 500;
   while (bench.motor(0).turns() < 1) {
-    bench.advance_period(released);
+    bench.advance_period(both_released);
     if (seen.empty() || seen.back() != bench.raw(0).hall) seen.push_back(bench.raw(0).hall);
   }
   EXPECT_EQ(std::set<int>(seen.begin(), seen.end()), (std::set<int>{1, 2, 3, 4, 5, 6}));
@@ -183,11 +183,11 @@ TEST(Faults, BeginAndEndWhenTheySay) {
   const auto cold = bench.raw(0).housing_counts;
   bench.faults().add(
       {.axis = 0, .channel = Channel::housing, .kind = FaultKind::offset, .value = 30, .from_s = 0.01, .to_s = 0.02});
-  for (int n = 0; n < 100; ++n) bench.advance_period(released);
+  for (int n = 0; n < 100; ++n) bench.advance_period(both_released);
   EXPECT_EQ(bench.raw(0).housing_counts, cold);
-  for (int n = 0; n < 200; ++n) bench.advance_period(released);
+  for (int n = 0; n < 200; ++n) bench.advance_period(both_released);
   EXPECT_LT(bench.raw(0).housing_counts, cold - 500);
-  for (int n = 0; n < 200; ++n) bench.advance_period(released);
+  for (int n = 0; n < 200; ++n) bench.advance_period(both_released);
   EXPECT_EQ(bench.raw(0).housing_counts, cold);
 }
 

@@ -16,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::usage, sentence); }
-
 enum class Need { must, may };
 enum class Range { positive, zero_or_more };
 

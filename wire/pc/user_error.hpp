@@ -29,4 +29,7 @@ class UserError : public std::runtime_error {
   Exit exit_;
 };
 
+/// Of an option or a file that a person wrote.
+[[noreturn]] inline void refuse(const std::string& sentence) { throw UserError(Exit::usage, sentence); }
+
 }  // namespace wire::pc
