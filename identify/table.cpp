@@ -70,6 +70,7 @@ std::string from_latin_1(std::string_view text) {
 /// Cells of one line. Returns false when a quote is never closed, or something follows it in its cell.
 bool split(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
+  if (separator == ' ') line = trimmed(line);
   std::size_t at = 0;
   while (true) {
     std::size_t start = at;
@@ -89,6 +90,7 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
     }
     if (at >= line.size()) return true;
     ++at;
+    while (separator == ' ' && line[at] == ' ') ++at;
   }
 }
 
@@ -209,14 +211,33 @@ std::string one_line(std::string_view s) {
 
 std::string shown(std::string_view s) { return one_line(s.substr(0, 40)) + (s.size() > 40 ? "..." : ""); }
 
-char separator_of(std::string_view header) {
+/// How many numbers a line has between blanks; 0 where anything else is there.
+std::size_t numbers_between_blanks(std::string_view line) {
+  std::vector<std::string_view> cells;
+  double unused = 0;
+  const bool whole = split(line, ' ', cells) && std::all_of(cells.begin(), cells.end(), [&](auto cell) {
+                       return means_missing(cell) || number(cell, false, unused);
+                     });
+  return whole ? cells.size() : 0;
+}
+
+/// Of the header that `text` begins with, or of its first row. Blanks separate what nothing else does, where there are
+/// as many numbers between them as words above.
+char separator_of(std::string_view text) {
+  const std::string_view line = text.substr(0, text.find('\n'));
   char best = ',';
   std::ptrdiff_t most = 0;
   for (const char c : {',', ';', '\t'}) {
-    const auto n = std::count(header.begin(), header.end(), c);
+    const auto n = std::count(line.begin(), line.end(), c);
     if (n > most) best = c, most = n;
   }
-  return best;
+  if (most > 0) return best;
+  std::vector<std::string_view> words;
+  text.remove_prefix(std::min(line.size() + 1, text.size()));
+  const bool by_blanks =
+      split(line, ' ', words) && words.size() >= least_columns &&
+      (numbers_between_blanks(line) || numbers_between_blanks(text.substr(0, text.find('\n'))) == words.size());
+  return by_blanks ? ' ' : best;
 }
 
 /// An object, or a list of what a list may hold; [Data] is a line that some loggers write.
@@ -233,7 +254,7 @@ bool is_json(std::string_view text) {
 bool widens(std::string_view rest) {
   for (int line = 0; line < 50 && !rest.empty(); ++line) {
     const std::string_view row = rest.substr(0, rest.find('\n'));
-    if (std::count(row.begin(), row.end(), separator_of(row)) + 1 >= static_cast<std::ptrdiff_t>(least_columns))
+    if (std::count(row.begin(), row.end(), separator_of(rest)) + 1 >= static_cast<std::ptrdiff_t>(least_columns))
       return true;
     rest.remove_prefix(std::min(row.size() + 1, rest.size()));
   }
@@ -336,7 +357,7 @@ Table read_table(const std::string& path) {
   std::string_view remark;  // the last '#' line: some programs write the header there
   int lines = 1;            // of the row
   for (int line = 1; !rest.empty(); line += lines) {
-    if (table.names.empty()) separator = separator_of(rest.substr(0, rest.find('\n')));
+    if (table.names.empty()) separator = separator_of(rest);
     const std::size_t end = end_of_row(rest, separator);
     const bool closed = end != std::string_view::npos;
     const std::string_view row = rest.substr(0, end);

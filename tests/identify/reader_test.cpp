@@ -99,6 +99,18 @@ TEST(Reader, TabsAreUnderstood) {
   EXPECT_DOUBLE_EQ(read("time_s\tcurrent_A\thousing_degC\n0\t1\t20\n1\t2\t21\n")[0].of(Role::housing)[1], 21);
 }
 
+TEST(Reader, BlanksSeparateWhatNothingElseDoes) {
+  for (const char* text : {"time_s current_A housing_degC\n0 1 20\n1 2 21\n",
+                           "A title of three\n\n time_s  current_A   housing_degC\n 0  1 20 \n 1  2 21 \r\n",
+                           "# time_s current_A housing_degC\n0.0e+00 1.0e+00 2.0e+01\n1.0e+00 2.0e+00 2.1e+01\n"}) {
+    const auto logs = read(text);
+    ASSERT_EQ(logs[0].of(Role::time).size(), 2u) << text;
+    EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[1], 2);
+    EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21);
+  }
+  says(complaint("time_s current_A housing_degC\n0 1 20\n1 2\n"), "line 3: the row has 2 of 3 cells");
+}
+
 TEST(Reader, AHeaderBehindAHashIsAHeader) {
   const auto logs = read("# logger 3\n# time_s,current_A,housing_degC\n0,1,20\n1,2,21\n");
   ASSERT_EQ(logs[0].of(Role::time).size(), 2u);
