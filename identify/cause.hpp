@@ -51,7 +51,7 @@ struct Parameter {
   const char* unit;
   Scale scale;
   double low, high;  // in units of the scale
-  double typical;    // prior standard deviation about none (about `typical` itself, in logarithm, where `logarithmic`)
+  double typical;    // the prior's width about none (about `typical` itself, in logarithm, where `logarithmic`): Student's t
   bool logarithmic = false;
   double none = 0;  // the value at which the cause does nothing
 };
