@@ -25,15 +25,11 @@ using wire::pc::UserError;
 [[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
 
 const std::array<std::string, role_count>& own_names() {
-  static const std::array<std::string, role_count> names = {"time_s",       "current_A",
-                                                            "id_A",         "iq_A",
-                                                            "power_W",      "speed_rad_per_s",
-                                                            "bus_V",        "bus_A",
-                                                            "core_degC",    "housing_degC",
-                                                            "ambient_degC", "coolant_degC",
-                                                            "frame_degC",   "neighbour_housing_degC",
-                                                            "board_degC",   "winding_ohm",
-                                                            "session"};
+  static const std::array<std::string, role_count> names = {
+      "time_s",       "current_A",       "id_A",         "iq_A",       "power_W",
+      "torque_Nm",    "speed_rad_per_s", "bus_V",        "bus_A",      "core_degC",
+      "housing_degC", "ambient_degC",    "coolant_degC", "frame_degC", "neighbour_housing_degC",
+      "board_degC",   "winding_ohm",     "session"};
   return names;
 }
 
@@ -151,6 +147,10 @@ double lowest(const std::vector<double>& v) {
   return low;
 }
 
+/// 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A is
+/// beyond any board this project drives or any traction log it was shown.
+double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 40 * motor->rated_current_A : 1000; }
+
 /// Units that a header did not tell: values that no motor shows.
 void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
   for (const Role role : temperatures) {
@@ -177,9 +177,7 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
                     "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
                     log.name, own_name(motor_at), lowest(log.of(motor_at))));
-  // 40 times rated current would heat any winding of the sheet by hundreds of kelvin a second; without a sheet 1000 A
-  // is beyond any board this project drives or any traction log it was shown.
-  const double most_A = motor ? 40 * motor->rated_current_A : 1000;
+  const double most_A = most_current_A(motor);
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A)
@@ -189,6 +187,24 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
                       log.name, own_name(role), peak, most_A));
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
+}
+
+/// Robots' logs often have a joint's torque and no current.
+void read_torque(Log& log, const std::optional<wire::Motor>& motor) {
+  if (!log.has(Role::torque) || log.has(Role::current) || log.has(Role::iq) || log.has(Role::power)) return;
+  const double Nm_per_A = motor ? 1.5 * motor->pole_pairs * motor->flux_linkage_Wb : 1;
+  for (const double Nm : log.of(Role::torque)) log.of(Role::iq).push_back(Nm / Nm_per_A);
+  log.of(Role::torque).clear();
+  const double peak_A = largest_magnitude(log.of(Role::iq)), most_A = most_current_A(motor);
+  if (peak_A > most_A)
+    refuse(
+        fmt::format("{}: torque_Nm takes {:.0f} A, where more than {:.0f} A cannot be; give the motor's own torque, "
+                    "before any gear, in newton metres.",
+                    log.name, peak_A, most_A));
+  log.notes.push_back(fmt::format("iq_A is torque_Nm at {:.4g} N m/A{}.", Nm_per_A,
+                                  motor ? ", by the motor file; it must be the motor's own torque, before any gear"
+                                        : ", for want of a motor file: R1 and R2 come out multiplied by the square of "
+                                          "the true A/N m, C1 and C2 divided by it"));
 }
 
 /// More current makes a winding hotter than its housing within seconds. Where it makes it cooler, and the housing moves
@@ -374,7 +390,7 @@ void note_unused(Log& log) {
     }
     return there;
   };
-  std::vector<std::string> unused = names({Role::bus_V, Role::bus_A, Role::board});
+  std::vector<std::string> unused = names({Role::torque, Role::bus_V, Role::bus_A, Role::board});
   if (log.has(Role::winding_ohm) && log.has(Role::core)) unused.push_back(own_name(Role::winding_ohm));
   if (log.has(Role::power)) {
     const auto currents = names({Role::current, Role::id, Role::iq});
@@ -406,7 +422,7 @@ Source give_clock(Table& table, const Sessions& sessions, double period_s) {
 }
 
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
-            const std::string& name) {
+            const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
   log.name = name;
   const std::size_t time_column = index_of(table, found.at(Role::time));
@@ -434,13 +450,15 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
-  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power))
-    refuse(name + ": the heat input (current_A, iq_A or power_W) has no value at all; record the log again.");
+  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
+    refuse(name +
+           ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
   check_epoch(log, time[rows.front()]);
   if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;
+  read_torque(log, motor);
   read_resistance(log);
   note_unused(log);
   return log;
@@ -547,8 +565,8 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
                                              table.file, found.at(Role::time).column));
   need(by_row || has(Role::time), "a time column",
        "call it time_s, say --column time_s=NAME, or --period S where the rows are S seconds apart");
-  need(has(Role::current) || has(Role::iq) || has(Role::power), "the heat input (current_A, iq_A or power_W)",
-       "map it with --column current_A=NAME");
+  need(has(Role::current) || has(Role::iq) || has(Role::power) || has(Role::torque),
+       "the heat input (current_A, iq_A, power_W or torque_Nm)", "map it with --column current_A=NAME");
   need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)",
        "map it with --column housing_degC=NAME");
 
@@ -567,7 +585,7 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   std::vector<Log> logs;
   for (const auto& [key, rows] : sessions) {
     Log whole = one_log(table, found, rows,
-                        sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file);
+                        sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file, motor);
     forget_filled(whole);
     forget_glitches(whole);
     check_values(whole, motor);

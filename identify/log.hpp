@@ -19,13 +19,14 @@
 namespace identify {
 
 /// What a column may be. Bus and board are read and checked, and nothing is made of them yet; winding_ohm becomes core
-/// where the start of a log tells its temperature.
+/// where the start of a log tells its temperature, torque becomes iq where nothing else tells the heat.
 enum class Role {
   time,
   current,
   id,
   iq,
   power,
+  torque,
   speed,
   bus_V,
   bus_A,

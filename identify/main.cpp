@@ -280,7 +280,8 @@ int main(int argc, char** argv) {
       "\n\n"
       "current_A: the direct current that heats alike through two terminals. Of sinusoidal phase currents it is "
       "sqrt(3)/2 of their amplitude, 1.22 times their rms. iq_A, id_A: amplitudes. power_W: what heats the winding; "
-      "taken before any current. winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
+      "taken before any current. torque_Nm: the motor's own, before any gear, where nothing else tells the heat. "
+      "winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
       "error says why.");

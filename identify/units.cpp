@@ -27,6 +27,8 @@ const std::map<std::string, Unit>& units() {
       {"W", {"power", 1, 0}},
       {"mW", {"power", 1e-3, 0}},
       {"kW", {"power", 1e3, 0}},
+      {"Nm", {"torque", 1, 0}},
+      {"mNm", {"torque", 1e-3, 0}},
       {"V", {"voltage", 1, 0}},
       {"mV", {"voltage", 1e-3, 0}},
       {"degC", {"temperature", 1, 0}},
@@ -56,7 +58,8 @@ const std::map<std::string, std::string>& spellings() {
       {"rpm", "rpm"},         {"1/min", "rpm"}, {"min-1", "rpm"}, {"degc", "degC"},
       {"°c", "degC"},         {"ºc", "degC"},  // the sign of an ordinal, for that of a degree
       {"celsius", "degC"},    {"degf", "degF"}, {"°f", "degF"},   {"ºf", "degF"},
-      {"fahrenheit", "degF"}, {"µs", "us"},     {"μs", "us"},                      // the sign micro, and the letter mu
+      {"fahrenheit", "degF"}, {"nm", "Nm"},     {"n·m", "Nm"},    {"n*m", "Nm"},
+      {"n.m", "Nm"},          {"µs", "us"},     {"μs", "us"},                      // the sign micro, and the letter mu
       {"Ω", "ohm"},           {"mΩ", "mohm"},   {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter omega, and the sign ohm
   };
   return table;

@@ -386,6 +386,25 @@ TEST(Reader, AMissingColumnIsNamedWithWhatThereIs) {
   says(complaint("t,current_A,housing_degC\n0,1,20\n"), "time column is missing");
   says(complaint("time_s,housing_degC\n0,20\n"), "heat input");
 }
+TEST(Reader, ATorqueTellsTheCurrentWhereNothingElseDoes) {
+  const std::string text = "time_s,torque_Nm,housing_degC\n0,-0.6,20\n1,1.2,20\n";
+  const Log free = read(text)[0];
+  EXPECT_DOUBLE_EQ(free.of(Role::iq)[0], -0.6);
+  says(free.notes.front(), "square of the true A/N m");
+  wire::Motor motor{};
+  motor.pole_pairs = 4;
+  motor.flux_linkage_Wb = 0.01;  // 0.06 N m/A
+  motor.rated_current_A = 2;
+  const Log known = identify::logs_of(identify::read_table(file(text)), {}, motor)[0];
+  EXPECT_DOUBLE_EQ(known.of(Role::iq)[1], 20);
+  EXPECT_FALSE(known.has(Role::torque));
+  says(known.notes.front(), "0.06 N m/A");
+  motor.rated_current_A = 0.4;
+  EXPECT_THROW(identify::logs_of(identify::read_table(file(text)), {}, motor), UserError) << "a joint's, behind a gear";
+  const Log both = read("time_s,torque_Nm,current_A,housing_degC\n0,1,2,20\n1,1,2,20\n")[0];
+  EXPECT_FALSE(both.has(Role::iq));
+  says(both.notes.front(), "torque_Nm is not used");
+}
 TEST(Reader, AMappedColumnThatIsNotThereIsNamedWithTheNearest) {
   ColumnMap map;
   identify::add_column(map, "housing_degC=T_bodi");
@@ -473,7 +492,7 @@ TEST(Reader, MessagesThatCameOneARowAreJudgedByTheirOwnInterval) {
 }
 TEST(Reader, AColumnOfNothingCountsAsMissing) {
   says(complaint(head + "0,1,\n1,1,nan\n2,1,\n"), "no temperature");
-  says(complaint(head + "0,,20\n1,nan,20\n2,,21\n"), "the heat input (current_A, iq_A or power_W) has no value");
+  says(complaint(head + "0,,20\n1,nan,20\n2,,21\n"), "the heat input (current_A, iq_A, power_W or torque_Nm) has no value");
 }
 TEST(Reader, RowsOutsideOfEverySessionAreSaid) {
   const auto logs = read("session,time_s,current_A,housing_degC\n1,0,1,20\n,1,1,20\n1,2,1,21\n");
