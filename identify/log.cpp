@@ -109,6 +109,11 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
   add_own_names(table, map, found);
   std::vector<std::string> by_row, by_name;
   for (auto& [role, source] : found) {
+    for (const auto& [other, same] : found) {
+      if (other < role && same.column == source.column)
+        refuse(fmt::format("{}: column '{}' cannot be both {} and {}; map another one.", table.file, source.column,
+                           own_name(other), own_name(role)));
+    }
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
       refuse(
           fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
@@ -119,6 +124,12 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
     std::vector<std::string>& by = unit.empty() ? by_name : by_row;
     if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
+    // "T [case]" tells no unit; "[Umdr./min]" tells one.
+    if (const std::string told = bracketed(source.column); unit.empty() && told.find_first_of("/^%") != told.npos)
+      notes.push_back(fmt::format(
+          "The unit '{}' of column '{}' is not known and not used; say --column {}={}:UNIT if it "
+          "is not the one in {} (units: {}).",
+          told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
     if (!unit.empty())
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the row of units below the header, column '{}' (--column {}={}:UNIT overrules it)",
@@ -195,6 +206,7 @@ void read_torque(Log& log, const std::optional<wire::Motor>& motor) {
   const double Nm_per_A = motor ? 1.5 * motor->pole_pairs * motor->flux_linkage_Wb : 1;
   for (const double Nm : log.of(Role::torque)) log.of(Role::iq).push_back(Nm / Nm_per_A);
   log.of(Role::torque).clear();
+  log.torque_for_A = !motor;
   const double peak_A = largest_magnitude(log.of(Role::iq)), most_A = most_current_A(motor);
   if (peak_A > most_A)
     refuse(
@@ -278,6 +290,53 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
                      table.line[rows[first]], t[first - 1], t[first], what_to_do));
 }
 
+/// Sorts rows of which some few, each for itself, stand up to five too late, as of messages that overtook each other;
+/// how many did. A clock that was set back stays so for more than a row.
+std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time) {
+  constexpr std::size_t most_late = 5;
+  constexpr double most_share = 0.05;
+  std::size_t moved = 0, latest = 0;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    if (time[rows[i]] >= time[rows[latest]]) {
+      latest = i;
+      continue;
+    }
+    const bool alone = latest + 1 == i;
+    if (!alone || (i > most_late && time[rows[i]] < time[rows[i - most_late - 1]])) return 0;
+    ++moved;
+  }
+  if (static_cast<double>(moved) > most_share * static_cast<double>(rows.size())) return 0;
+  std::stable_sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) { return time[a] < time[b]; });
+  return moved;
+}
+
+/// Times told too coarsely for the rows, in whole seconds most often: rows that share one are spread until the next.
+void spread_shared_times(Log& log) {
+  std::vector<double>& t = log.of(Role::time);
+  std::vector<std::size_t> first = {0};
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (t[i] != t[i - 1]) first.push_back(i);
+  }
+  if (first.size() < 3 || t.size() < 2 * first.size()) return;
+  const std::vector<double> told_s = t;
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < first.size(); ++k) steps_s.push_back(told_s[first[k]] - told_s[first[k - 1]]);
+  const double step_s = median(steps_s);
+  std::vector<double> rows;
+  for (std::size_t k = 1; k < first.size(); ++k) rows.push_back(static_cast<double>(first[k] - first[k - 1]));
+  const double usual = median(rows);
+  first.push_back(t.size());
+  for (std::size_t k = 0; k + 1 < first.size(); ++k) {
+    // The log may begin and end within a step; what is missing of the first is missing before it.
+    const double count = std::max(usual, static_cast<double>(first[k + 1] - first[k]));
+    const double skipped = k == 0 ? count - static_cast<double>(first[1]) : 0;
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i)
+      t[i] = told_s[i] + step_s * (static_cast<double>(i - first[k]) + skipped) / count;
+  }
+  log.notes.push_back(
+      fmt::format("About {:g} rows share each time; they are spread over the {:g} s to the next.", usual, step_s));
+}
+
 /// Takes rows away that say again, time and all, what the row before them says; how many.
 std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, const std::vector<double>& time) {
   const auto same = [&](std::size_t a, std::size_t b) {
@@ -316,7 +375,9 @@ double middle(std::vector<double> v) {
   return std::accumulate(v.begin() + cut, v.end() - cut, 0.0) / static_cast<double>(std::ssize(v) - 2 * cut);
 }
 
-/// How many rows come before anything heats or turns. One part in a thousand of the most heat is a sensor's offset.
+/// How many rows come before anything heats or turns. One part in a thousand of the most heat is a sensor's offset, or
+/// its noise where it is not so three times running; a hundredth is neither. A row that tells nothing, as of a bus
+/// that writes one message a row, is rest between two that do.
 std::size_t rows_at_rest(const Log& log) {
   const auto heat = [&](std::size_t i) {
     if (log.has(Role::power)) return std::abs(log.of(Role::power)[i]);
@@ -333,8 +394,19 @@ std::size_t rows_at_rest(const Log& log) {
   const auto turns = [&](std::size_t i) {
     return log.has(Role::speed) && std::abs(log.of(Role::speed)[i]) > least_rad_per_s;
   };
+  constexpr double untold_s = 5;  // longer is a pause (pauses.cpp), in which anything may flow
+  const std::vector<double>& t = log.of(Role::time);
+  double told_s = t.front();
   std::size_t rest = 0;
-  while (rest < rows && heat(rest) <= 1e-3 * most && !turns(rest)) ++rest;  // what is not told is no rest
+  for (std::size_t i = 0, running = 0; i < rows && !turns(i) && !(heat(i) > 1e-2 * most); ++i) {
+    const bool told = !std::isnan(heat(i));
+    if (!told && t[i] - told_s > untold_s) break;
+    if (!told) continue;
+    told_s = t[i];
+    running = heat(i) > 1e-3 * most ? running + 1 : 0;
+    if (running == 3) break;
+    if (running == 0) rest = i + 1;
+  }
   return rest;
 }
 
@@ -436,6 +508,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
                        chosen.size()));
   if (rows.size() < chosen.size())
     log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
+  if (const std::size_t moved = put_in_order(rows, time); moved > 0)
+    log.notes.push_back(fmt::format("Rows that were out of order by a few were sorted by time: {}.", moved));
   if (const std::size_t repeated = drop_repeated(rows, table, time); repeated > 0)
     log.notes.push_back(fmt::format("Rows that are the same as the row before were left out: {}.", repeated));
   for (const auto& [role, source] : found) {
@@ -456,6 +530,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   check_epoch(log, time[rows.front()]);
   if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
+  spread_shared_times(log);
   const double start_s = log.of(Role::time).front();
   for (double& t : log.of(Role::time)) t -= start_s;
   read_torque(log, motor);
@@ -586,6 +661,13 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   for (const auto& [key, rows] : sessions) {
     Log whole = one_log(table, found, rows,
                         sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file, motor);
+    if (!std::isnan(map.ambient_degC)) {
+      if (whole.has(sink_of(whole)))
+        throw UserError(Exit::usage,
+                        fmt::format("{}: its {} tells how warm the surroundings are; leave --ambient away.", table.file,
+                                    own_name(sink_of(whole))));
+      whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC);
+    }
     forget_filled(whole);
     forget_glitches(whole);
     check_values(whole, motor);

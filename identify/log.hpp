@@ -65,8 +65,9 @@ struct Source {
 /// Which column plays which role, and how its unit becomes ours.
 struct ColumnMap {
   std::map<Role, Source> columns;
-  double period_s = missing;  // from row to row of logs without a clock
-  std::string note;           // what a person should know of these logs, printed in the report
+  double period_s = missing;      // from row to row of logs without a clock
+  double ambient_degC = missing;  // of logs without a sink
+  std::string note;               // what a person should know of these logs, printed in the report
 };
 
 /// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and, where wanted, a
@@ -96,6 +97,7 @@ struct Log {
   double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
   Reference core_reference = {};  // of readings of the winding
+  bool torque_for_A = false;      // a torque stands in iq_A as it is, for want of the motor's constant
   bool loaded_before = false;     // a row's load flowed since the row before, not until the next one
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }

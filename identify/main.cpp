@@ -39,7 +39,7 @@ Examples
 struct Arguments {
   std::vector<std::string> logs, columns, truths;
   std::string motor, map, hold_out, json, html, write_model, write_baseline;
-  std::optional<double> period_s;
+  std::optional<double> period_s, ambient_degC;
   bool explain = false;
   int draws = identify::HoldOut{}.draws;
 };
@@ -193,6 +193,7 @@ int answer(Arguments a) {
   for (const std::string& column : a.columns) identify::add_column(said, column);
   for (const auto& [role, source] : said.columns) map.columns[role] = source;
   if (a.period_s) map.period_s = *a.period_s;
+  if (a.ambient_degC) map.ambient_degC = *a.ambient_degC;
   if (!a.truths.empty()) return score(a, map, motor);
   std::optional<identify::Doing> doing(std::in_place);
   (*doing)("reading");
@@ -245,6 +246,10 @@ int main(int argc, char** argv) {
   app.add_option("--period", a.period_s, "seconds from row to row, of logs without a time column")
       ->check(CLI::Range(1e-6, 86400.0))
       ->type_name("S");
+  app.add_option("--ambient", a.ambient_degC,
+                 "how warm the room was, of logs without ambient_degC; else what a log begins at is taken for it")
+      ->check(CLI::Range(-60.0, 100.0))
+      ->type_name("DEGC");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,
                  "a log, or the last part of each log as a fraction (0.25 or 25%), that is scored and not fitted")

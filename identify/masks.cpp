@@ -38,9 +38,11 @@ void mask_frozen(Log& log, Role role) {
   std::size_t rows = 0;
   double longest_s = 0, from_s = 0;
   for (const auto& [from, to] : runs) {
-    // The first reading of a run was measured; only its repetitions are not.
-    for (std::size_t i = from + 1; i < to; ++i) v[i] = missing;
-    rows += to - from - 1;
+    // The first reading of a run was measured, and its repetitions were not; of a sensor that was not up when the log
+    // began neither.
+    const bool began =
+        std::all_of(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(from), [](double x) { return std::isnan(x); });
+    for (std::size_t i = began ? from : from + 1; i < to; ++i) v[i] = missing, ++rows;
     if (t[to - 1] - t[from] > longest_s) longest_s = t[to - 1] - t[from], from_s = t[from];
   }
   log.notes.push_back(
@@ -204,7 +206,7 @@ void note_missing_readings(Log& log) {
 void note_gaps(Log& log) {
   const auto& t = log.of(Role::time);
   const std::vector<double> spacing_s = spacing(t);
-  const double usual_s = median(spacing_s);
+  const double usual_s = row_period_s(t);
   double lost_s = 0, held_s = 0;
   int gaps = 0;
   for (std::size_t i = 0; i < spacing_s.size(); ++i) {

@@ -8,7 +8,7 @@
 namespace identify {
 
 /// Turns readings, up to three in a row, that jump away and back as no temperature can, and single rows of a current
-/// that is ten times what ever lasts, into missing ones.
+/// that is ten times what ever lasts (of a power, a hundred), into missing ones.
 void forget_glitches(Log& log);
 
 /// Turns frozen readings into missing ones, sums up what is missing and lies in gaps, leaves of a coarse sensor the

@@ -21,23 +21,6 @@ constexpr double most_share = 0.02;      // of the rows: more are a logger that 
 // (bins_of: 30 rows, too_poor: 20 readings).
 constexpr std::size_t least_rows = 100, least_readings = 40;
 
-/// Does a measured current's noise show from row to row, up and down by little? A commanded one repeats itself, leaps,
-/// or goes one way; a coarse one repeats itself.
-bool is_noisy(const std::vector<double>& v, double range) {
-  double last = missing, change = 0;
-  int rows = 0, turns = 0;
-  for (const double x : v) {
-    if (std::isnan(x)) continue;
-    if (std::abs(x) > 0.1 * range) {
-      ++rows;
-      turns += change * (x - last) < 0 && std::abs(x - last) < 0.1 * range;
-    }
-    change = std::isnan(last) ? 0 : x - last;
-    last = x;
-  }
-  return turns > 0.4 * rows;  // of white noise two thirds turn
-}
-
 /// Forgets a heat input that stands still under load although its noise shows elsewhere.
 void forget_frozen_input(Log& log) {
   constexpr double least_s = 30;
@@ -142,6 +125,21 @@ void take_out_pauses(Log& log) {
 }
 
 }  // namespace
+
+bool is_noisy(const std::vector<double>& v, double range) {
+  double last = missing, change = 0;
+  int rows = 0, turns = 0;
+  for (const double x : v) {
+    if (std::isnan(x)) continue;
+    if (std::abs(x) > 0.1 * range) {
+      ++rows;
+      turns += change * (x - last) < 0 && std::abs(x - last) < 0.1 * range;
+    }
+    change = std::isnan(last) ? 0 : x - last;
+    last = x;
+  }
+  return turns > 0.4 * rows;  // of white noise two thirds turn
+}
 
 std::vector<Log> parts_between_pauses(Log log) {
   forget_frozen_input(log);

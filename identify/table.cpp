@@ -11,6 +11,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "identify/median.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -112,12 +113,18 @@ std::size_t end_of_row(std::string_view rest, char separator) {
   return quoted ? line_end : std::string_view::npos;
 }
 
-bool means_missing(std::string_view s) {
-  if (s.empty()) return true;
-  std::string low(s.substr(0, 5));
+std::string in_small(std::string_view s) {
+  std::string low(s);
   std::transform(low.begin(), low.end(), low.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return low == "nan" || low == "na" || low == "n/a" || low == "null" || low == "none" || low == "-" || low == "-nan";
+  return low;
+}
+
+bool means_missing(std::string_view s) {
+  if (s.empty()) return true;
+  // #NV: a German spreadsheet's #N/A.
+  constexpr std::string_view words[] = {"nan", "-nan", "na", "n/a", "#n/a", "#nv", "null", "none", "-", "--"};
+  return std::find(std::begin(words), std::end(words), in_small(s.substr(0, 5))) != std::end(words);
 }
 
 /// Digits and nothing else as a whole number.
@@ -142,17 +149,39 @@ bool time_of_day(std::string_view s, double& value) {
   return true;
 }
 
-/// A date and time as ISO 8601 writes it (2026-11-21T08:15:30.5+01:00, or with a blank), s since 1970; or a time of
-/// day.
+bool number(std::string_view s, bool decimal_comma, double& value);
+
+/// The date that a cell begins with, and where its time begins: 2026-11-21 as in ISO 8601, 21.11.2026 as in Germany, or
+/// 21-Nov-2026 as in MATLAB. 11/21 and 21/11 cannot be told apart.
+bool date_of(std::string_view s, std::chrono::year_month_day& date, std::size_t& clock) {
+  constexpr std::string_view months = "jan feb mar apr may jun jul aug sep oct nov dec";
+  int year = 0, month = 0, day = 0;
+  if (s.size() < 19) return false;
+  const auto made_of = [&](std::size_t y, std::size_t m, std::size_t d, std::size_t length) {
+    clock = length + 1;
+    if (!digits(s.substr(y, 4), year) || !digits(s.substr(d, 2), day)) return false;
+    if (m != std::string_view::npos && !digits(s.substr(m, 2), month)) return false;
+    date = {std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+            std::chrono::day(static_cast<unsigned>(day))};
+    return date.ok() && (s[length] == ' ' || s[length] == 'T');
+  };
+  if (s[4] == '-' && s[7] == '-') return made_of(0, 5, 8, 10);
+  if (s[2] == '.' && s[5] == '.') return made_of(6, 3, 0, 10);
+  const std::size_t name = s[2] == '-' && s[6] == '-' ? months.find(in_small(s.substr(3, 3))) : std::string_view::npos;
+  month = static_cast<int>(name / 4) + 1;
+  return name != std::string_view::npos && made_of(7, std::string_view::npos, 0, 11);
+}
+
+/// A date and time (2026-11-21T08:15:30.5+01:00), s since 1970; a time of day; or what MATLAB writes of a duration.
 bool moment(std::string_view s, double& value) {
-  int year = 0, month = 0, day = 0, hours = 0, minutes = 0;
+  int hours = 0, minutes = 0;
   if (time_of_day(s, value)) return true;
-  if (s.size() < 19 || s[4] != '-' || s[7] != '-' || (s[10] != 'T' && s[10] != ' ') || !digits(s.substr(0, 4), year) ||
-      !digits(s.substr(5, 2), month) || !digits(s.substr(8, 2), day))
-    return false;
-  const std::chrono::year_month_day date(std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day)));
-  std::string_view clock = s.substr(11);
+  if (s.ends_with(" sec")) return number(s.substr(0, s.size() - 4), false, value);
+  std::chrono::year_month_day date;
+  std::size_t begin = 0;
+  if (!date_of(s, date, begin)) return false;
+  std::string_view clock = s.substr(begin);
+  if (clock.ends_with(" UTC") || clock.ends_with(" GMT")) clock.remove_suffix(4);
   double ahead_s = 0;
   if (clock.back() == 'Z') {
     clock.remove_suffix(1);
@@ -164,7 +193,7 @@ bool moment(std::string_view s, double& value) {
     ahead_s = (clock[sign] == '-' ? -60 : 60) * (60 * hours + minutes);
     clock = clock.substr(0, sign);
   }
-  if (!date.ok() || !time_of_day(trimmed(clock), value)) return false;
+  if (!time_of_day(trimmed(clock), value)) return false;
   value += 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) - ahead_s;
   return true;
 }
@@ -273,10 +302,10 @@ std::string at_line(const Table& table, int line, const std::string& what) {
 bool name_columns(Table& table, const std::vector<std::string_view>& row, std::string_view remark, char separator,
                   int line) {
   double value = missing;
-  const bool numbers = number(row.front(), separator == ';', value) && std::isfinite(value);
+  const bool numbers = number(row.front(), separator != ',', value) && std::isfinite(value);
   std::vector<std::string_view> header = row;
   if (numbers &&
-      (!split(remark, separator, header) || header.size() != row.size() || !all_words(header, separator == ';'))) {
+      (!split(remark, separator, header) || header.size() != row.size() || !all_words(header, separator != ','))) {
     refuse(table, line,
            "numbers where the header should be; put a line with column names (such as "
            "time_s,current_A,housing_degC) first.");
@@ -299,7 +328,7 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
                               shown(cells[c]), shown(table.names[c]),
                               like_a_moment(cells[c])
                                   ? ", nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
-                                    "2026-11-21T08:15:30.5+01:00)"
+                                    "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30)"
                                   : ""));
     }
     table.columns[c].push_back(value);
@@ -333,6 +362,25 @@ std::vector<double> spacing(const std::vector<double>& cells) {
   return out;
 }
 
+double row_period_s(const std::vector<double>& time_s) {
+  constexpr std::size_t most_rows = 24;                 // of two messages at 10 Hz and one at 1 Hz 21
+  constexpr double alike = 0.25, repeats_itself = 0.9;  // to this share of a row; of the places where it may begin
+  double best = 0, period_s = missing;
+  for (std::size_t rows = 1; rows <= most_rows && rows < time_s.size(); ++rows) {
+    std::vector<double> length_s;
+    for (std::size_t i = rows; i < time_s.size(); ++i) length_s.push_back(time_s[i] - time_s[i - rows]);
+    const double usual_s = median(length_s);
+    const auto near = std::count_if(length_s.begin(), length_s.end(), [&](double s) {
+      return std::abs(s - usual_s) * static_cast<double>(rows) <= alike * usual_s;
+    });
+    const double share = static_cast<double>(near) / static_cast<double>(length_s.size());
+    if (rows == 1 || (share > best && share > repeats_itself))
+      best = share, period_s = usual_s / static_cast<double>(rows);
+    if (best > repeats_itself) break;
+  }
+  return period_s;
+}
+
 int Table::find(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   return at == names.end() ? -1 : static_cast<int>(at - names.begin());
@@ -345,6 +393,7 @@ Table read_table(const std::string& path) {
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
   if (!is_utf8(text)) text = from_latin_1(text);
+  if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');  // old Macintosh's
   std::string_view rest = text;
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   if (is_json(rest)) {
@@ -393,10 +442,10 @@ Table read_table(const std::string& path) {
                  closed ? "; repair or delete this line."
                         : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
     }
-    if (table.line.empty() && table.units.empty() && all_words(cells, separator == ';'))
+    if (table.line.empty() && table.units.empty() && all_words(cells, separator != ','))
       table.units.assign(cells.begin(), cells.end());
     else
-      add_row(table, cells, separator == ';', line);
+      add_row(table, cells, separator != ',', line);
   }
   if (table.names.empty()) {
     throw UserError(Exit::unusable, path + ": the file is empty; record a log with a header line and rows.");

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
 //
-//   in   a file: comma, semicolon or tab; quotes, and line ends in them; CRLF; byte-order mark; '#' lines and rows of
-//        empty cells before the header, or '#' before it as well; a row of units below it; decimal comma when the
-//        separator is a semicolon; times as ISO 8601 writes them
+//   in   a file: comma, semicolon, tab or blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines and
+//   rows of
+//        empty cells before the header, or '#' before it as well; a row of units below it; decimal comma where no
+//        comma separates; times as ISO 8601, MATLAB and German loggers write them
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
 //        mistake only for who uses it
 //
@@ -28,6 +29,11 @@ double largest_magnitude(const std::vector<double>& cells);
 
 /// From each cell to the next, one fewer.
 std::vector<double> spacing(const std::vector<double>& cells);
+
+/// From row to row, usually. Rows may come in bursts (one for each message, a millisecond apart, ten times a second):
+/// of a pattern of up to `most` rows that repeats itself better than they do one by one, its mean. Missing of fewer
+/// than two.
+double row_period_s(const std::vector<double>& time_s);
 
 struct Table {
   std::string file;

@@ -21,6 +21,7 @@ const std::map<std::string, Unit>& units() {
       {"ns", {"time", 1e-9, 0}},
       {"min", {"time", 60, 0}},
       {"h", {"time", 3600, 0}},
+      {"d", {"time", 86400, 0}},
       {"A", {"current", 1, 0}},
       {"mA", {"current", 1e-3, 0}},
       {"kA", {"current", 1e3, 0}},
@@ -55,12 +56,20 @@ const std::map<std::string, Unit>& units() {
 /// How loggers spell these too, in small letters and without blanks.
 const std::map<std::string, std::string>& spellings() {
   static const std::map<std::string, std::string> table = {
-      {"rpm", "rpm"},         {"1/min", "rpm"}, {"min-1", "rpm"}, {"degc", "degC"},
-      {"°c", "degC"},         {"ºc", "degC"},  // the sign of an ordinal, for that of a degree
-      {"celsius", "degC"},    {"degf", "degF"}, {"°f", "degF"},   {"ºf", "degF"},
-      {"fahrenheit", "degF"}, {"nm", "Nm"},     {"n·m", "Nm"},    {"n*m", "Nm"},
-      {"n.m", "Nm"},          {"µs", "us"},     {"μs", "us"},                      // the sign micro, and the letter mu
-      {"Ω", "ohm"},           {"mΩ", "mohm"},   {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter omega, and the sign ohm
+      {"rpm", "rpm"},       {"1/min", "rpm"},    {"min-1", "rpm"},      {"min^-1", "rpm"},
+      {"u/min", "rpm"},     {"r/min", "rpm"},    {"rev/min", "rpm"},    {"rps", "rev/s"},
+      {"rad/sec", "rad/s"}, {"rads-1", "rad/s"}, {"rad*s^-1", "rad/s"}, {"deg/sec", "deg/s"},
+      {"amp", "A"},         {"amps", "A"},       {"ampere", "A"},       {"amperes", "A"},
+      {"mamp", "mA"},       {"mamps", "mA"},     {"milliamps", "mA"},   {"watt", "W"},
+      {"watts", "W"},       {"sec", "s"},        {"secs", "s"},         {"second", "s"},
+      {"seconds", "s"},     {"msec", "ms"},      {"usec", "us"},        {"nsec", "ns"},
+      {"minutes", "min"},   {"hours", "h"},      {"days", "d"},         {"kelvin", "K"},
+      {"degc", "degC"},     {"celsius", "degC"}, {"degf", "degF"},      {"fahrenheit", "degF"},
+      {"nm", "Nm"},         {"n·m", "Nm"},       {"n*m", "Nm"},         {"n.m", "Nm"},
+      {"ohms", "ohm"},      {"°c", "degC"},      {"ºc", "degC"},        {"°f", "degF"},
+      {"ºf", "degF"},                      // º: the sign of an ordinal
+      {"µs", "us"},         {"μs", "us"},  // the sign micro, the letter mu
+      {"Ω", "ohm"},         {"mΩ", "mohm"},      {"Ω", "ohm"},          {"mΩ", "mohm"},  // the letter, the sign ohm
   };
   return table;
 }
@@ -99,15 +108,16 @@ std::string quantity_of(const std::string& suffix) {
   return unit ? unit->quantity : std::string();
 }
 
+std::string bracketed(const std::string& column) {
+  const std::size_t open = column.find_last_of("([");
+  if (open == std::string::npos || !(column.ends_with(')') || column.ends_with(']'))) return "";
+  return column.substr(open + 1, column.size() - open - 2);
+}
+
 std::string unit_in_name(const std::string& column, const std::string& role) {
   const std::string wanted = quantity_of_role(role);
   const auto fits = [&](const std::string& unit) { return !wanted.empty() && quantity_of(unit) == wanted; };
-  if (column.ends_with(')') || column.ends_with(']')) {
-    const std::size_t open = column.find_last_of("([");
-    if (open == std::string::npos) return "";
-    const std::string unit = column.substr(open + 1, column.size() - open - 2);
-    return fits(unit) ? unit : "";
-  }
+  if (const std::string unit = bracketed(column); !unit.empty()) return fits(unit) ? unit : "";
   for (std::size_t cut = column.find_first_of("_ "); cut != std::string::npos;
        cut = column.find_first_of("_ ", cut + 1)) {
     const std::string unit = column.substr(cut + 1);

@@ -21,6 +21,9 @@ std::vector<std::string> unit_names();
 /// Quantity of one of our own unit suffixes ("A", "degC", "rad_per_s"); empty when it is none.
 std::string quantity_of(const std::string& suffix);
 
+/// What stands in brackets at the end of a column's name; else empty.
+std::string bracketed(const std::string& column);
+
 /// The unit that a column's name ends in, where it is one of what `role` (an own name, unit included) measures: "Time
 /// (ms)", "I [mA]", "current_mA"; else empty. A bare letter is none: T_K and motor_C may be anything.
 std::string unit_in_name(const std::string& column, const std::string& role);
