@@ -57,7 +57,7 @@ void add_plots(const Problem& problem, const Fit& f, const std::string& remark, 
     const Replayed r = replayed(problem, f, l);
     LogPlot plot;
     plot.name = log.name + remark;
-    plot.heat_label = problem.heated_by_power() ? "power, W" : "current, A";
+    plot.heat_label = problem.heated_by_power() ? "power, W" : log.torque_for_A ? "torque, N m" : "current, A";
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       const Bin& b = log.bins[k];
       plot.time_s.push_back((static_cast<double>(k) + 0.5) * log.width_s);

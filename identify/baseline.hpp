@@ -34,7 +34,7 @@ void add_extended(const Problem& problem, const Fit& fit, Report& report, std::s
 double stated_error(double value, double std_error);
 
 /// Unit of a parameter that goes by `scale`: without a sheet the resistance is taken as 1 ohm, and heat comes out
-/// divided by what it is in truth.
+/// divided by the true one.
 std::string stated_unit(const Problem& problem, const char* unit, Scale scale);
 
 /// R1, R2, C1 and C2. `inflation`: of the standard errors, where the model leaves more than noise.

@@ -18,7 +18,7 @@ namespace {
 using thermal::Boundary;
 using thermal::Drive;
 
-/// 36,000 take a search 12 to 19 s on one core (README), so these a minute and a half at most.
+/// 36,000 take a search 5 s on two cores (fit_speed), so these half a minute.
 constexpr double most_bins = 200000;
 /// Of the current with its ripple, rms: without it there is less, but for what two sensors differ by.
 constexpr double most_sampled_share = 1.1;
@@ -101,6 +101,7 @@ Inputs inputs_of(const Log& log, Bins& out) {
     in.amplitude_A = in.sampled_A = log.has(Role::iq) ? sampled_A(log) : std::vector<double>(t.size(), 0.0);
   }
   out.has_power = log.has(Role::power);
+  out.torque_for_A = log.torque_for_A;
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
   in.speed_rad_per_s = log.has(Role::speed) ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);
 
@@ -111,6 +112,7 @@ Inputs inputs_of(const Log& log, Bins& out) {
   } else {
     const double first = std::isnan(log.sink_degC) ? first_degC(log) : log.sink_degC;
     sink.assign(t.size(), first);
+    out.sink_assumed = true;
     out.notes.push_back(fmt::format(
         "No ambient temperature was recorded; what the log begins at, {:.1f} degC, is taken for it.", first));
   }
@@ -315,9 +317,7 @@ void find_starts(Bins& out, const Log& log) {
 }
 
 void find_idle(Bins& out) {
-  const auto heat = [](const Bin& bin) {
-    return std::max(bin.input[Drive::current_A2], std::abs(bin.input[Drive::power_W]));
-  };
+  const auto heat = [by = heater(out)](const Bin& bin) { return std::abs(bin.input[by]); };
   double most_heat = 0, most_speed = 0;
   for (const Bin& bin : out.bins) {
     most_heat = std::max(most_heat, heat(bin));
@@ -325,7 +325,8 @@ void find_idle(Bins& out) {
   }
   // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch; nor does its noise, nor a
   // fiftieth of the top speed: of what goes by its square that is less than a thousandth as well.
-  const double least_heat = std::max(1e-3 * most_heat, 4 * out.current_noise_A * out.current_noise_A);
+  const double noise_A2 = out.has_power ? 0 : out.current_noise_A * out.current_noise_A;
+  const double least_heat = std::max(1e-3 * most_heat, 4 * noise_A2);
   for (Bin& bin : out.bins)
     bin.idle = heat(bin) <= least_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
 }
@@ -363,7 +364,7 @@ Bins bins_of(const Log& log, double finest_s) {
   out.core_noise_K = reading_noise(log.of(Role::core));
 
   const auto& t = log.of(Role::time);
-  const double usual_s = median(spacing(t));
+  const double usual_s = row_period_s(t);
   const auto refuse = [&](const std::string& what) {
     throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
   };

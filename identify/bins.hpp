@@ -25,8 +25,9 @@ inline const double amplitude_per_direct = 2 / std::sqrt(3.0);
 inline constexpr double stalled_rad_per_s = 2;  // about three seconds a turn
 inline constexpr double longest_bin_s = 2;      // but of many hours under a slow winding (problem.cpp)
 
-/// Of a coarse sensor's step: how well its moment is known at worst (search.cpp asks the residual for better). Noise of
-/// 0 to 0.4 of it leaves readings 0.02 to 0.12 off (Masks.ASensorOfWholeDegreesIsReadAsItSteps holds them to this).
+/// Of a coarse sensor's step: how well its moment is known at worst (disturbance.cpp asks the residual for better).
+/// Noise of 0 to 0.4 of it leaves readings 0.02 to 0.12 off (Masks.ASensorOfWholeDegreesIsReadAsItSteps holds them to
+/// this).
 inline constexpr double step_noise_share = 0.15;
 
 struct Bin {
@@ -55,6 +56,8 @@ struct Bins {
   std::string name;
   double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
+  bool torque_for_A = false;  // as in Log
+  bool sink_assumed = false;  // to be as warm as what the log begins at
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
   std::vector<Start> starts = {Start{}};                        // the first at bin 0
   double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences

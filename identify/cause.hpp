@@ -51,9 +51,9 @@ struct Parameter {
   const char* unit;
   Scale scale;
   double low, high;  // in units of the scale
-  double typical;    // the prior's width about none (about `typical` itself, in logarithm, where `logarithmic`): Student's t
+  double typical;    // the prior's width about `none` (of its logarithm, where `logarithmic`): Student's t
   bool logarithmic = false;
-  double none = 0;  // the value at which the cause does nothing
+  double none = 0;  // where the prior is centred: what does nothing, or, of what always does something, the usual
 };
 
 enum class Needs { nothing, current, speed, neighbour, frame, several_currents, several_logs, several_powers, copper };
@@ -92,6 +92,8 @@ struct Chosen {
 
 inline const Cause& cause_of(const Chosen& chosen) { return causes()[static_cast<std::size_t>(chosen.cause)]; }
 
+inline constexpr double least_lag_s = 0.02;  // of a sensor that lags: none at all has no slope to fit by
+
 /// Edits `model` by `cause` with parameters `k` in physical units. `log`: which log the model replays.
 template <class S>
 void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log, Model<S>& model) {
@@ -113,8 +115,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
           static_cast<std::int8_t>(cause.node), cause.drive, k[0],
           cause.drive == thermal::Drive::current2_speed2 ? set.sources[0].coefficient_per_K : S(0)};
       break;
-    case Edit::coefficient:
-      set.sources[0].coefficient_per_K = k[0];
+    case Edit::coefficient:  // of all copper, whichever of two causes comes first
+      for (int s = 0; s < set.source_count; ++s) {
+        if (s == 0 || !(set.sources[s].coefficient_per_K == 0.0)) set.sources[s].coefficient_per_K = k[0];
+      }
       break;
     case Edit::sink_law:
       set.links[model.sink_link].law = cause.law;
@@ -162,7 +166,7 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
       model.offset = true;
       break;
     case Edit::sensor_lag:
-      set.housing.lag_s = k[0] + 0.02;  // s: a lag of zero has no slope to fit by
+      set.housing.lag_s = k[0] + least_lag_s;
       break;
     case Edit::sensor_offset:
       set.housing.offset_K = k[0];

@@ -15,7 +15,7 @@ namespace {
 constexpr int winding = 0, housing = 1;
 
 Cause heat(const char* id, const char* name, int node, Drive drive, Needs needs, const char* unit, double most,
-           const char* signature, const char* rivals, const char* experiment, double least = 0) {
+           const char* signature, const char* rivals, const char* experiment) {
   return {id,
           name,
           Edit::source,
@@ -24,7 +24,7 @@ Cause heat(const char* id, const char* name, int node, Drive drive, Needs needs,
           LinkLaw::constant,
           Boundary::ambient,
           needs,
-          {{"gain", unit, Scale::heat_per_drive, least, most, 0.4}},
+          {{"gain", unit, Scale::heat_per_drive, 0, most, 0.4}},
           signature,
           rivals,
           experiment};

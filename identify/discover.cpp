@@ -217,8 +217,10 @@ double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& 
 void compare_columns(const std::vector<Log>& logs, Report& report) {
   const Log& first = logs.front();
   for (const Log& log : logs) {
-    if (log.has(Role::power) != first.has(Role::power)) {
-      const auto kind = [](const Log& l) { return l.has(Role::power) ? "a power" : "a current"; };
+    if (log.has(Role::power) != first.has(Role::power) || log.torque_for_A != first.torque_for_A) {
+      const auto kind = [](const Log& l) {
+        return l.has(Role::power) ? "a power" : l.torque_for_A ? "a torque" : "a current";
+      };
       throw wire::pc::UserError(wire::pc::Exit::unusable,
                                 fmt::format("{}: its heat is recorded as {}, that of {} as {}; give logs of one kind.",
                                             log.name, kind(log), first.name, kind(first)));
@@ -265,6 +267,22 @@ Offer for_the_board(const Problem& problem, const Search& found, Report& report)
   return given;
 }
 
+/// Where no ambient was recorded, how warm the room was is a rival of what may be nothing else.
+void tell_that_a_room_is_assumed(const Problem& problem, const Search& found, Report& report) {
+  const auto assumed = [](const Bins& log) { return log.sink_assumed; };
+  if (found.verdict == Verdict::adequate || std::none_of(problem.logs.begin(), problem.logs.end(), assumed)) return;
+  const std::string advice =
+      "No ambient was recorded: a room that is not as warm as what the log begins at, or changes, looks like constant "
+      "heat, an offset or a drift; if you know it say --ambient DEGC.";
+  const bool alike = std::any_of(found.tied.begin(), found.tied.end(), [](const auto& ids) {
+    return holds(ids, "constant_heat") || holds(ids, "sensor_offset") || holds(ids, "ambient_drift");
+  });
+  if (alike)
+    report.sentence += " " + advice;
+  else
+    report.notes.push_back(advice);
+}
+
 /// By how many rows the temperatures are ahead of the load. Many loggers write with a row what flowed before it.
 double rows_ahead(const Problem& problem, const Fit& f) {
   const int delay = coordinate_of(f, Edit::delay);
@@ -289,6 +307,7 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
   doing("asking whether the logs can tell, and whether they are read right");
   poor = too_short(problem, base, found);
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
+  if (poor.empty()) poor = clipped(found, logs);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
   if (!poor.empty() || !held_out || found.chosen.fit.chosen.empty()) return out;
   const std::string refused = veto(problem, found.base.fit, found.chosen.fit);
@@ -304,7 +323,9 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
 /// Why no board gets a set; empty when one does.
 std::string why_no_model(const Problem& problem, const std::string& poor) {
   if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
-  return problem.heated_by_power() ? "the log tells a power and a board measures a current; record current_A" : "";
+  if (problem.heated_by_power()) return "the log tells a power and a board measures a current; record current_A";
+  if (!problem.in_amperes()) return "the log tells a torque and a board measures a current; give --motor FILE";
+  return "";
 }
 
 /// Each log by its file alone, and by as many of the folders above it as tell it from the others.
@@ -443,6 +464,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     doing("looking for an experiment");
     report.experiment = experiment(problem, found, most_A(problem, motor));
     report.sentence = sentence(found, report);
+    tell_that_a_room_is_assumed(problem, found, report);
   }
   if (unseen) {
     doing("scoring what was held out");

@@ -75,7 +75,9 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   for (const std::vector<Disturbance>& larger : tried) {
     for (const Disturbance& d : larger) {
       if (d.evidence > out.evidence) out = d;
-      if (d.evidence < out.evidence - past_top) break;  // a slower one must be near the faster at once
+      // A slower one counts where its smallest is near: taken at any size it made three named logs of three that no
+      // model quite fits "unknown" or a tie (search_test, traction).
+      if (d.evidence < out.evidence - past_top) break;
     }
   }
   return out;

@@ -74,15 +74,17 @@ const std::vector<Protocol>& protocols() {
   return all;
 }
 
-/// The protocol as bins of two seconds, no readings yet.
+/// The protocol as bins, no readings yet.
 Bins bins_for(const Problem& problem, const std::vector<ProfileStep>& steps, double unit_A, double unit_rad_per_s) {
   const Bins& like = problem.logs.front();
   Bins out;
   out.name = "experiment";
   out.width_s = std::min(longest_bin_s, 4 * like.width_s);  // a rival is fitted in each protocol: for speed
   out.has_housing = like.has_housing;
-  // As often as the log was read.
-  const double housing_n = like.has_housing ? out.width_s / like.interval_s : 0;
+  // As often as the log was read: not in every row, where the sensor is slow or coarse.
+  double readings = 0;
+  for (const Bin& bin : like.bins) readings += double{bin.housing_n};
+  const double housing_n = out.width_s * readings / like.duration_s();
   out.has_core = problem.any_core();
   double sink = 0;
   for (const Bin& bin : like.bins) sink += bin.input.boundary_degC[0] / static_cast<double>(like.bins.size());
@@ -133,13 +135,13 @@ void fill(Problem& trial, const Fit& truth) {
   }
 }
 
-/// Sets that an experiment is to tell apart, three at most.
-std::vector<const Candidate*> sets_to_separate(const Search& found) {
+/// The sets that tie, but for those of one of several logs.
+std::vector<const Candidate*> tied_sets(const Search& found) {
   std::vector<const Candidate*> out;
   for (const Candidate& c : found.sets) {
     const bool picks_a_log =
         std::any_of(c.fit.chosen.begin(), c.fit.chosen.end(), [](const Chosen& x) { return x.log >= 0; });
-    if ((c.chosen || c.tied) && !picks_a_log && out.size() < 3) out.push_back(&c);
+    if ((c.chosen || c.tied) && !picks_a_log) out.push_back(&c);
   }
   return out;
 }
@@ -159,9 +161,11 @@ double least_apart(Problem& trial, const std::vector<const Candidate*>& tied) {
 }  // namespace
 
 std::optional<Experiment> experiment(const Problem& problem, const Search& found, double most_A) {
-  if (found.verdict != Verdict::ambiguous || problem.heated_by_power()) return std::nullopt;
-  const std::vector<const Candidate*> tied = sets_to_separate(found);
-  if (tied.size() < 2) return std::nullopt;
+  if (found.verdict != Verdict::ambiguous || !problem.in_amperes()) return std::nullopt;
+  const std::vector<const Candidate*> all = tied_sets(found);
+  if (all.size() < 2) return std::nullopt;
+  constexpr std::ptrdiff_t most = 3;  // each is fitted to each other, in each protocol
+  const std::vector<const Candidate*> tied(all.begin(), all.begin() + std::min(most, std::ssize(all)));
   double top = 0;
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) top = std::max(top, bin.input[Drive::speed_rad_per_s]);
@@ -185,7 +189,7 @@ std::optional<Experiment> experiment(const Problem& problem, const Search& found
     bool cool = false;
     for (int i = 0; i < most_tries && !cool; ++i) {
       trial.logs = {bins_for(problem, protocol.steps, amps, top)};
-      cool = std::all_of(tied.begin(), tied.end(), stays_cool);
+      cool = std::all_of(all.begin(), all.end(), stays_cool);
       if (!cool) amps *= weaker;
     }
     if (!cool) continue;

@@ -47,7 +47,7 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
   for (const Chosen& c : chosen) {
     for (const Parameter& p : cause_of(c).parameters) {
       if (p.logarithmic) {
-        const double centre = std::log(p.none != 0 ? p.none : p.typical);
+        const double centre = std::log(p.none);
         out.push_back({centre, centre, p.typical, std::log(p.low), std::log(p.high), true});
       } else {
         out.push_back({p.none, p.none, p.typical, p.low, p.high, true});

@@ -143,7 +143,7 @@ Answers answers_of(const thermal::HeatSet<double>& believed, const thermal::Trus
 }  // namespace
 
 std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const Fit& extended) {
-  if (problem.heated_by_power()) return std::nullopt;
+  if (!problem.in_amperes()) return std::nullopt;
   const auto before_set = heat_set_of(problem, baseline), truth = heat_set_of(problem, extended);
   if (!thermal::validate(before_set, estimator_dt_s).ok() || !thermal::validate(truth, estimator_dt_s).ok())
     return std::nullopt;
@@ -169,7 +169,7 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
 }
 
 const Offer& most_cautious(const Problem& problem, const std::vector<Offer>& offers) {
-  if (problem.heated_by_power()) return offers.front();
+  if (!problem.in_amperes()) return offers.front();
   const thermal::HeatInput<> work = working_point(problem);
   const double most_A = asked_over_rms * problem.rms_A;
   // One current for all, above what any of them carries for an hour.

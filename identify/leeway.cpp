@@ -100,7 +100,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
     // Another load begins with a row: what is read ahead of it goes by the one, what is read late by the other.
     const Replayed after = replayed(problem, delayed, l),
                    before = replayed(problem, with_cause(prompt, "clock_delay", {-row_s / 2}), l);
-    lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / lag_s));
+    lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / (lag_s + least_lag_s)));
     lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
     moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
     ahead.housing_K.emplace_back(plain.core_degC.size(), 0.0);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What is simulated: a heat set (thermal/heat_set.hpp), and what may be wrong around it: clocks, sensors, ambient.
 //
-// The heat set is what the board runs. The rest belongs to the recording, not to the motor, and stays on the PC.
+// The heat set is what the board runs, with the sensor's share (model_file.cpp). The rest stays on the PC.
 // Templated on the scalar: double to look, dual numbers to fit.
 #pragma once
 

@@ -70,6 +70,7 @@ struct Problem {
   double rms_A = 1, speed08_mean = 1, duration_s = 1;
 
   bool heated_by_power() const { return logs.front().has_power; }
+  bool in_amperes() const { return !logs.front().has_power && !logs.front().torque_for_A; }
   bool any_core() const;
   double scale(Scale s, thermal::Drive drive) const;
   bool possible(const Cause& cause) const;  // the logs hold what it needs

@@ -20,7 +20,11 @@ std::string too_short(const Problem& problem, const Fit& base, const Search& fou
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor);
 
-/// Where nothing explains a log: may what is left be of rows too far apart, or of a load that cells do not tell? Empty
+/// Does the sensor of what heats reach no further than what it shows most? Empty when it does, and when two resistors
+/// are adequate all the same.
+std::string clipped(const Search& found, const std::vector<Log>& logs);
+
+/// May what was found, or what nothing explains, be of rows too far apart, or of a load that cells do not tell? Empty
 /// when not.
 std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs);
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Runs a model over a log's bins, by the very step that the board runs (thermal/network.hpp): exact for constant links
 // and held inputs, second order in what depends on temperature itself. With dual numbers it carries the exact
-// sensitivities along. Cost: linear in the number of bins; no heap.
+// sensitivities along. Cost: linear in the number of bins.
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <vector>
 
@@ -266,7 +267,10 @@ void replay(const Model<S>& model, const Bins& log, const std::vector<Initial<S>
   if constexpr (most_nodes >= 3) {
     if (model.set.node_count == 3) return replay_detail::prepare_and_run<3>(model, log, initial, visit);
   }
-  if constexpr (most_nodes >= 4) return replay_detail::prepare_and_run<4>(model, log, initial, visit);
+  if constexpr (most_nodes >= 4) {
+    if (model.set.node_count == 4) return replay_detail::prepare_and_run<4>(model, log, initial, visit);
+  }
+  assert(false && "more nodes than this replay was compiled for");
 }
 
 }  // namespace identify

@@ -171,6 +171,7 @@ Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>
 
 /// One cause or two?
 void choose(const Problem& judged, bool counted, const Margins& margins, Field field, Search& out) {
+  if (counted && !field.pairs.empty()) add_neighbours(judged, field, field.pairs);
   const std::string refusal = why_no_pair(judged, counted, field, margins);
   const std::vector<Candidate> singles = field.singles;
   if (refusal.empty()) {
@@ -178,7 +179,6 @@ void choose(const Problem& judged, bool counted, const Margins& margins, Field f
     out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.gain,
                                     pair.gain - single.gain, listed(single.fit.chosen)));
     out.sets = std::move(field.pairs);
-    if (counted) add_neighbours(judged, field, out.sets);
   } else {
     out.steps.push_back(refusal);
     out.sets = std::move(field.singles);
@@ -261,7 +261,7 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
 }
 
 /// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
-/// from the best by no more than what is left.
+/// from the best by no more than twice what is left (Margins::left_apart).
 void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
   const double by_noise_K = of_current_K(problem, margins);
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
@@ -342,9 +342,9 @@ std::string held_by_a_bound(const Fit& f, double tie) {
   Eigen::Index at = base_count;
   for (const Chosen& chosen : f.chosen) {
     for (const Parameter& p : cause_of(chosen).parameters) {
-      const bool natural = std::string_view(p.name) == "share" || (p.low == 0 && !(f.x[at] > 0));
+      const bool all = cause_of(chosen).edit == Edit::sensor_share, none = p.low == 0 && !(f.x[at] > 0);
       const double gain = f.gradient[at] * f.gradient[at] * covariance(at, at);  // of a parabola, were the bound let go
-      if (f.at_bound[static_cast<std::size_t>(at++)] && !natural && gain > tie) return p.name;
+      if (f.at_bound[static_cast<std::size_t>(at++)] && !all && !none && gain > tie) return p.name;
     }
   }
   return "";

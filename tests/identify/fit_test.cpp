@@ -350,6 +350,29 @@ TEST(Fit, ADelayOfNothingChangesNothingAndOneOfAWholeBinMovesByOneBin) {
   }
 }
 
+TEST(Fit, OfTwoCausesEitherMayComeFirst) {
+  const Problem problem = problem_from(off_sheet(9));
+  const Fit base = identify::fit(problem, {});
+  const auto with = [](const Fit& f, const identify::Cause& cause) {
+    const auto& p = cause.parameters;
+    const auto size = [](const identify::Parameter& q) { return q.logarithmic ? 0.3 : q.none + q.typical; };
+    return p.size() == 1 ? with_cause(f, cause.id, {size(p[0])}) : with_cause(f, cause.id, {size(p[0]), size(p[1])});
+  };
+  for (const identify::Cause& a : identify::causes()) {
+    for (const identify::Cause& b : identify::causes()) {
+      if (&a >= &b || !problem.possible(a) || !problem.possible(b)) continue;
+      if (a.edit == identify::Edit::sink_law && b.edit == identify::Edit::sink_law) continue;  // never together
+      const auto one = identify::replayed(problem, with(with(base, a), b), 0),
+                 other = identify::replayed(problem, with(with(base, b), a), 0);
+      double apart_K = 0;
+      for (std::size_t k = 0; k < one.housing_degC.size(); ++k)
+        apart_K = std::max({apart_K, std::abs(one.housing_degC[k] - other.housing_degC[k]),
+                            std::abs(one.core_degC[k] - other.core_degC[k])});
+      EXPECT_LT(apart_K, 1e-6) << a.id << " and " << b.id;
+    }
+  }
+}
+
 TEST(Fit, LeewayAveragesOverALagOfSecondsAndNotOverOneOfHalfAMinute) {
   Problem problem = problem_from(off_sheet(9));
   const Fit base = identify::fit(problem, {});

@@ -22,8 +22,8 @@
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/says.hpp"
-#include "tests/slow_build.hpp"
 #include "tests/identify/traction.hpp"
+#include "tests/slow_build.hpp"
 
 namespace {
 
@@ -283,6 +283,62 @@ TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   for (const std::string& note : identify::discover(tests::bench_logs({options}), std::nullopt).notes)
     said += note + "\n";
   says(said, "3/4 of the resistance between two terminals, 3/2 of a phase's");
+}
+
+TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
+  tests::BenchOptions options;
+  options.seconds = 1800;
+  options.start_degC = 40;
+  auto logs = tests::bench_logs({options});
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  logs[0].of(identify::Role::ambient).clear();
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  ASSERT_NE(report.verdict, "adequate");
+  says(report.sentence, "No ambient was recorded: a room that is not as warm as what the log begins at");
+  EXPECT_EQ(report.model_toml.find("gain = -"), std::string::npos) << "heat out of the housing, for a board";
+}
+
+TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
+  tests::BenchOptions options;
+  options.seconds = 1200;
+  options.current_A = [](double t, std::mt19937_64&) {  // steps of 1.3 Hz, in spells of a minute
+    return std::fmod(t, 1 / 1.3) < 0.3 && std::fmod(t, 120) < 60 ? 4.0 : 0.0;
+  };
+  auto logs = tests::bench_logs({options});
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  for (auto& column : logs[0].columns) {  // a row a second
+    for (std::size_t i = 0; 10 * i < column.size(); ++i) column[i] = column[10 * i];
+    column.resize(column.size() / 10);
+  }
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  EXPECT_EQ(report.verdict, "insufficient");
+  says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
+}
+
+TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
+  tests::BenchOptions options;
+  options.seconds = 1200;
+  options.current_A = [](double t, std::mt19937_64& random) {
+    const double hold_A = std::fmod(t, 100) < 20 ? 4.0 : std::fmod(t, 100) < 60 ? 1.5 : 0.0;
+    return hold_A + 0.03 * std::normal_distribution<double>()(random);
+  };
+  auto logs = tests::bench_logs({options});
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  for (double& amps : logs[0].of(identify::Role::current)) amps = std::min(amps, 3.0);
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  EXPECT_EQ(report.verdict, "insufficient");
+  says(report.sentence, "current_A stands at its largest value, 3, in 2400 rows and is noisy elsewhere");
+}
+
+TEST(Report, OfATorqueWithoutTheMotorsConstantNoAmperesAreTold) {
+  tests::BenchOptions options;
+  options.seconds = 300;
+  auto logs = tests::bench_logs({options});
+  logs[0].torque_for_A = true;
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.no_model, "the log tells a torque and a board measures a current; give --motor FILE");
+  EXPECT_FALSE(report.gain || report.experiment);
+  EXPECT_EQ(report.plots.front().heat_label, "torque, N m");
 }
 
 TEST(Report, WhatIsAdequateHasNothingToGain) {
