@@ -365,17 +365,25 @@ std::vector<double> spacing(const std::vector<double>& cells) {
 double row_period_s(const std::vector<double>& time_s) {
   constexpr std::size_t most_rows = 24;                 // of two messages at 10 Hz and one at 1 Hz 21
   constexpr double alike = 0.25, repeats_itself = 0.9;  // to this share of a row; of the places where it may begin
+  // Rows of a grid some of which are missing are no pattern, however regularly they are.
+  const std::vector<double> spacing_s = spacing(time_s);
+  const double usual_s = median(spacing_s);
+  const auto on_grid = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double s) {
+    const double rows = std::round(s / usual_s);
+    return rows >= 1 && rows <= 5 && std::abs(s - rows * usual_s) <= 0.1 * usual_s;
+  });
+  if (static_cast<double>(on_grid) >= repeats_itself * static_cast<double>(spacing_s.size())) return usual_s;
   double best = 0, period_s = missing;
   for (std::size_t rows = 1; rows <= most_rows && rows < time_s.size(); ++rows) {
     std::vector<double> length_s;
     for (std::size_t i = rows; i < time_s.size(); ++i) length_s.push_back(time_s[i] - time_s[i - rows]);
-    const double usual_s = median(length_s);
+    const double middle_s = median(length_s);
     const auto near = std::count_if(length_s.begin(), length_s.end(), [&](double s) {
-      return std::abs(s - usual_s) * static_cast<double>(rows) <= alike * usual_s;
+      return std::abs(s - middle_s) * static_cast<double>(rows) <= alike * middle_s;
     });
     const double share = static_cast<double>(near) / static_cast<double>(length_s.size());
     if (rows == 1 || (share > best && share > repeats_itself))
-      best = share, period_s = usual_s / static_cast<double>(rows);
+      best = share, period_s = middle_s / static_cast<double>(rows);
     if (best > repeats_itself) break;
   }
   return period_s;
