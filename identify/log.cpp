@@ -518,7 +518,14 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     auto& to = log.of(role);
     to.reserve(rows.size());
     for (const std::size_t r : rows) to.push_back(source.factor * (from[r] + source.offset));
-    if (count_told(to) == 0) {
+    // A sensor that is not connected; 0 degC all along, and not by a hundredth otherwise, is no weather.
+    const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
+                           count_told(to) > 1 && largest_magnitude(to) == 0;
+    if (unplugged) {
+      to.clear();
+      log.notes.push_back(
+          fmt::format("{} is 0 in all rows, as of a sensor that is not connected, and was left out.", own_name(role)));
+    } else if (count_told(to) == 0) {
       to.clear();
       log.notes.push_back(
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));

@@ -198,6 +198,12 @@ TEST(Reader, ARoomIsToldOnceForAllRowsWhereNoColumnTellsIt) {
        "its coolant_degC tells how warm the surroundings are; leave --ambient away");
 }
 
+TEST(Reader, ASensorThatReadsNothingButZeroIsLeftOut) {
+  const Log log = read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,0\n2,2,22,0\n")[0];
+  EXPECT_FALSE(log.has(Role::ambient));
+  says(log.notes[0], "ambient_degC is 0 in all rows, as of a sensor that is not connected, and was left out.");
+}
+
 TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 0.2);
