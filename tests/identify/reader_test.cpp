@@ -198,6 +198,15 @@ TEST(Reader, ARoomIsToldOnceForAllRowsWhereNoColumnTellsIt) {
        "its coolant_degC tells how warm the surroundings are; leave --ambient away");
 }
 
+TEST(Reader, AHousingThatAFrameMovesMoreThanItsWindingIsNoSwappedColumn) {
+  std::string text = "time_s,current_A,housing_degC,core_degC\n";
+  for (int i = 0; i < 60; ++i) {  // a quarter more than the winding, with the load
+    const bool warm = i % 4 < 2;
+    text += fmt::format("{},{},{},{}\n", 30 * i, warm ? 2 : 0, warm ? 25 : 20, warm ? 25 : 21);
+  }
+  EXPECT_TRUE(read(text)[0].has(Role::core));
+}
+
 TEST(Reader, ASensorThatReadsNothingButZeroIsLeftOut) {
   const Log log = read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,0\n2,2,22,0\n")[0];
   EXPECT_FALSE(log.has(Role::ambient));
