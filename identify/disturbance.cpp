@@ -75,8 +75,8 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   for (const std::vector<Disturbance>& larger : tried) {
     for (const Disturbance& d : larger) {
       if (d.evidence > out.evidence) out = d;
-      // A slower one counts where its smallest is near: taken at any size it made three named logs of three that no
-      // model quite fits "unknown" or a tie (search_test, traction).
+      // A slower one counts where its smallest is near: taken at any size three tests failed (Search.WhereNoRest...,
+      // Search.WhereQuietSensors..., Traction.WhereNothingExplains...).
       if (d.evidence < out.evidence - past_top) break;
     }
   }

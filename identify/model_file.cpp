@@ -40,7 +40,8 @@ Model<double> hottest_model_of(const Problem& problem, const Fit& f) {
     const double K_per_drive = m.set.sources[0].gain / sink_W_per_K;
     if (K_per_drive > most_K_per_drive) most_K_per_drive = K_per_drive, hottest = m;
   }
-  if (!problem.logs.front().sink_assumed) return hottest;
+  if (std::none_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.sink_assumed; }))
+    return hottest;
   // Of a log that began warmer than a room it does not tell; a board would take its motor for cooler than it is.
   for (int s = 0; s < hottest.set.source_count; ++s) {
     auto& source = hottest.set.sources[s];

@@ -25,7 +25,7 @@ using thermal::Drive;
 
 /// Of rest: second differences over eight seconds share the curvature of a cooling curve, and hardly any noise. They
 /// are counted a fifth higher than they are: at their own height a model's error was taken for a cause's, and of 624
-/// hidden logs six that were named or tied became "unknown" (score, four rows of --seeds 6 --first 72000).
+/// hidden logs five that were named or tied became "unknown" (score, four rows of --seeds 6 --first 72000).
 constexpr double block_s = 90, spare = 1.2;
 /// The winding still empties into the housing: of a small motor it has a time constant of 1 to 20 s (pauses.cpp).
 constexpr double after_load_s = 20;

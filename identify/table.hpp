@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
 //
-//   in   a file: comma, semicolon, tab or blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines and
-//   rows of
+//   in   a file: comma, semicolon, tab, blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines; rows of
 //        empty cells before the header, or '#' before it as well; a row of units below it; decimal comma where no
 //        comma separates; times as ISO 8601, MATLAB and German loggers write them
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
@@ -31,7 +30,7 @@ double largest_magnitude(const std::vector<double>& cells);
 std::vector<double> spacing(const std::vector<double>& cells);
 
 /// From row to row, usually. Rows may come in bursts (one for each message, a millisecond apart, ten times a second):
-/// of a pattern of up to `most` rows that repeats itself better than they do one by one, its mean. Missing of fewer
+/// of a pattern of up to 24 rows that repeats itself better than they do one by one, its mean. Missing of fewer
 /// than two.
 double row_period_s(const std::vector<double>& time_s);
 
