@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Reads a text table (CSV) as people and loggers write it, and refuses a broken one in one sentence.
 //
-//   in   a file: comma, semicolon, tab, blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines; rows of
-//        empty cells before the header, or '#' before it as well; a row of units below it; decimal comma where no
-//        comma separates; times as ISO 8601, MATLAB and German loggers write them
+//   in   a file: comma, semicolon, tab, blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines,
+//        rows of empty cells before the header, or '#' before it as well; a row of units below it; decimal comma where
+//        no comma separates; times as ISO 8601, MATLAB and German loggers write them
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
 //        mistake only for who uses it
 //
