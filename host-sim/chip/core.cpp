@@ -32,13 +32,16 @@ void map_device(uc_engine* uc, std::uint32_t size, Bus* bus) {
   check(uc_mmio_map(uc, base, size, mmio_read<base>, bus, mmio_write<base>, bus));
 }
 
+/// What RAM holds at power-up is undefined (RM0090 does not say); ones are NaN to a float and far away to an integer.
+constexpr std::uint8_t unwritten = 0xFF;
+
 }  // namespace
 
 Core::Core(Bus& bus, Nvic& nvic, std::uint8_t* flash)
     : bus_(bus),
       nvic_(nvic),
-      ram_(ram_size),
-      ccm_(ccm_size),
+      ram_(ram_size, unwritten),
+      ccm_(ccm_size, unwritten),
       system_(system_size, 0xFF),
       flash_(flash),
       cache_(flash_size / 2) {
