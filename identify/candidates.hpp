@@ -17,7 +17,8 @@ struct Candidate {
   double gain = 0;   // twice the logarithm of its evidence over the baseline's
   double ratio = 0;  // rms of whitened residuals, both channels
   bool chosen = false;
-  bool tied = false;  // as good as the best; where two resistors are adequate, likelier than they are
+  bool tied = false;    // as good as the best
+  bool likely = false;  // a board must not take it for excluded: nearly as good; likelier than adequate two resistors
 };
 
 /// Every cause alone and the pairs worth fitting, each best first, under the noise of the problem.

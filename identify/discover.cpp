@@ -240,30 +240,31 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
   }
 }
 
-/// What a board is given. Where the data cannot choose, it must not take the milder model for true: of sets that tie,
-/// and of two resistors and what is likelier by the log and only too little to be named, it gets the one that bears a
-/// push the shortest. Where nothing explains the log, no fit is worth more than a sheet.
+/// What a board is given. Where the data cannot choose, it must not take the milder model for true: of sets that tie or
+/// are nearly as good as the named one, and of two resistors and what is likelier by the log and only too little to be
+/// named, it gets the one that bears a push the shortest. Where nothing explains the log, no fit is worth more than a
+/// sheet.
 Offer for_the_board(const Problem& problem, const Search& found, Report& report) {
   const Fit& best = found.chosen.fit;
   const bool unexplained = found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient;
   const thermal::Trust trust = trust_of(problem, best, unexplained ? thermal::sheet_trust : thermal::identified_trust);
   std::vector<Offer> open = {{&best, trust}};
-  if (found.verdict == Verdict::ambiguous) {
+  if (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) {
     for (const Candidate& c : found.sets) {
-      if (c.tied) open.push_back({&c.fit, trust_of(problem, c.fit)});
+      if (c.likely) open.push_back({&c.fit, trust_of(problem, c.fit)});
     }
   }
   if (found.verdict == Verdict::adequate) {
     for (const Candidate& c : found.singles) {
-      if (c.tied) open.push_back({&c.fit, trust});
+      if (c.likely) open.push_back({&c.fit, trust});
     }
   }
   if (open.size() == 1) return open.front();
   const Offer& given = most_cautious(problem, open);
-  report.reasoning.push_back(
-      fmt::format("The model written for the board is, of those that the log bears out as well, the one that bears a "
-                  "push the shortest: {}.",
-                  given.fit->chosen.empty() ? "two resistors" : listed(names_of(given.fit->chosen), " and ")));
+  report.reasoning.push_back(fmt::format(
+      "The model written for the board is, of those that the log bears out about as well, the one that bears a "
+      "push the shortest: {}.",
+      given.fit->chosen.empty() ? "two resistors" : listed(names_of(given.fit->chosen), " and ")));
   return given;
 }
 

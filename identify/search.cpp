@@ -262,20 +262,22 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
 
 /// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
 /// from the best by no more than twice what is left (Margins::left_apart).
-void mark_ties(const Problem& problem, const Left& left, double reach, const Margins& margins, Search& out) {
+void mark_ties(const Problem& problem, const Left& left, double lead, double reach, const Margins& margins,
+               Search& out) {
   const double by_noise_K = of_current_K(problem, margins);
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
     const double behind = out.chosen.gain - c.gain;
+    c.likely = !c.chosen && behind < margins.tie;
     if (c.chosen || (behind >= reach && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
-    if (behind >= margins.tie) {
+    if (behind >= lead) {
       const double apart_K = moved_K(problem, out.chosen.fit, c.fit);
       const bool near = behind < reach && (out.tied.size() == 1 || apart_K <= margins.left_apart * left.after_K);
       if (!near && !(apart_K < by_noise_K)) continue;
     }
-    c.tied = true;
+    c.tied = c.likely = true;
     out.tied.push_back(ids);
   }
 }
@@ -331,7 +333,7 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
   });
   const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
   for (std::size_t i = 0; i < likelier.size(); ++i)
-    out.singles[i].tied = likelier[i] > std::max(margins.likelier, most - margins.tie);
+    out.singles[i].likely = likelier[i] > std::max(margins.likelier, most - margins.tie);
 }
 
 /// The first parameter of the causes that its bound holds against evidence worth more than `tie`; empty when none does.
@@ -361,7 +363,7 @@ void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
   std::vector<Fit*> handed_on = {&out.base.fit, &out.chosen.fit};
   for (std::vector<Candidate>* candidates : {&out.sets, &out.singles}) {
     for (Candidate& c : *candidates) {
-      if (c.tied) handed_on.push_back(&c.fit);
+      if (c.likely) handed_on.push_back(&c.fit);
     }
   }
   in_parallel(handed_on.size(), [&](std::size_t i) {
@@ -422,8 +424,9 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   choose(judged, judged.noise.disturbance_K > problem.noise.disturbance_K, margins, std::move(field), out);
   doing("looking at what the best leave");
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
-  const double reach = left.complete ? margins.tie : margins.tie + left.gain;
-  mark_ties(problem, left, reach, margins, out);
+  const double lead = out.chosen.fit.chosen.size() == 1 ? margins.tie_alone : margins.tie;
+  const double reach = left.complete ? lead : lead + left.gain;
+  mark_ties(problem, left, lead, reach, margins, out);
   decide(problem, left, without_causes, reach, margins, out);
   doing("fitting what a board gets");
   refit_for_the_board(judged, margins, out);

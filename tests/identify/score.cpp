@@ -390,7 +390,8 @@ int main(int argc, char** argv) {
   app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
   app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();
   app.add_option("--second", a.margins.second, "for a second one")->capture_default_str();
-  app.add_option("--tie", a.margins.tie, "lead asked for a name")->capture_default_str();
+  app.add_option("--tie", a.margins.tie, "lead asked for a name of two causes")->capture_default_str();
+  app.add_option("--tie-alone", a.margins.tie_alone, "lead asked for a name of one")->capture_default_str();
   app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")->capture_default_str();
   app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")->capture_default_str();
   auto* quick = app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
