@@ -699,6 +699,16 @@ TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
   says(small.model_toml, "hot spot");
 }
 
+TEST(ModelFile, ABoardGetsTheMostCautiousOfWhatIsNearlyAsGoodAsTheName) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto report = report_of({.core = tests::Core::none, .seed = 72004252, .effects = {"speed_loss_quadratic"}});
+  ASSERT_EQ(report.verdict, "explained");
+  EXPECT_EQ(report.tied, (std::vector<std::vector<std::string>>{{"speed_loss_quadratic"}}));
+  std::string all;
+  for (const std::string& step : report.reasoning) all += step + "\n";
+  says(all, "bears a push the shortest");
+}
+
 TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report =
