@@ -63,7 +63,7 @@ std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
 
 void tell(const Problem& problem, const Search& found, Report& report) {
   report.verdict = word(found.verdict);
-  report.tied = found.tied;
+  if (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
   report.ladder = ladder_of(found);
   if (found.doubted) {

@@ -122,7 +122,7 @@ struct Report {
   std::string core_refusal;        // empty: a core temperature may be stated
   std::vector<CauseLine> causes;
   std::vector<ParameterLine> extended;         // R1, R2, C1, C2 beside the causes
-  std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good, the best first
+  std::vector<std::vector<std::string>> tied;  // ids of the sets named or tied, the best first; else empty
   std::vector<Rung> ladder;
   std::optional<HeldOut> held_out;
   std::optional<Gain> gain;

@@ -714,6 +714,7 @@ TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
   const auto report =
       report_of({.core = tests::Core::none, .seed = 770529, .effects = {"radiation"}, .mostly_small = true});
   ASSERT_EQ(report.verdict, "unknown_cause");
+  EXPECT_TRUE(report.tied.empty()) << "no name";
   says(report.sentence, "radiation would explain it, and so would a slow disturbance without a name");
   says(report.notes.back(), "What would tell whether it is radiation");
 }
