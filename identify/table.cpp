@@ -298,6 +298,16 @@ std::string at_line(const Table& table, int line, const std::string& what) {
   throw UserError(Exit::unusable, at_line(table, line, what));
 }
 
+/// LabVIEW's .lvm: what is said of the file and of its channels ends in this line each time. How many lines it took.
+int skip_preamble(std::string_view& rest) {
+  const std::size_t mark = rest.rfind("***End_of_Header***");
+  const std::size_t end = mark == std::string_view::npos ? mark : rest.find('\n', mark);
+  if (end == std::string_view::npos) return 0;
+  const auto lines = std::count(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(end) + 1, '\n');
+  rest.remove_prefix(end + 1);
+  return static_cast<int>(lines);
+}
+
 /// Names the columns: this row does, or, where it holds numbers, the '#' line before it. Was it the row?
 bool name_columns(Table& table, const std::vector<std::string_view>& row, std::string_view remark, char separator,
                   int line) {
@@ -412,8 +422,8 @@ Table read_table(const std::string& path) {
   char separator = ',';
   std::vector<std::string_view> cells;
   std::string_view remark;  // the last '#' line: some programs write the header there
-  int lines = 1;            // of the row
-  for (int line = 1; !rest.empty(); line += lines) {
+  int lines = skip_preamble(rest);
+  for (int line = 1 + lines; !rest.empty(); line += lines) {
     if (table.names.empty()) separator = separator_of(rest);
     const std::size_t end = end_of_row(rest, separator);
     const bool closed = end != std::string_view::npos;

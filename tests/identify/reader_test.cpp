@@ -95,6 +95,19 @@ TEST(Reader, SemicolonsDecimalCommasQuotesCrlfAndByteOrderMarkAreUnderstood) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::housing)[1], 21.5);
 }
 
+TEST(Reader, WhatLabViewWritesAboveItsTableIsPassedOver) {
+  const std::string above =
+      "LabVIEW Measurement\t\nSeparator\tTab\nDate\t2026/11/21\n***End_of_Header***\t\n\t\n"
+      "Channels\t2\t\t\nY_Unit_Label\tAmps\tDeg C\t\nDelta_X\t1.0\t1.0\t\n***End_of_Header***\t\t\t\n"
+      "X_Value\tcurrent_A\thousing_degC\tComment\n";
+  ColumnMap map;
+  identify::add_column(map, "time_s=X_Value");
+  const auto logs = read(above + "0.0\t1.0\t20.5\t\n1.0\t2.0\t21.5\t\n", map);
+  EXPECT_EQ(logs[0].of(Role::current), (std::vector<double>{1, 2}));
+  EXPECT_EQ(logs[0].of(Role::housing), (std::vector<double>{20.5, 21.5}));
+  says(complaint(above + "0.0\t1.0\t20.5\t\n1.0\t2.0\n", map), "line 12");
+}
+
 TEST(Reader, TabsAreUnderstood) {
   EXPECT_DOUBLE_EQ(read("time_s\tcurrent_A\thousing_degC\n0\t1\t20\n1\t2\t21\n")[0].of(Role::housing)[1], 21);
 }
