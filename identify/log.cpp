@@ -671,10 +671,10 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
                         sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file, motor);
     if (!std::isnan(map.ambient_degC)) {
       if (whole.has(sink_of(whole)))
-        throw UserError(Exit::usage,
-                        fmt::format("{}: its {} tells how warm the surroundings are; leave --ambient away.", table.file,
-                                    own_name(sink_of(whole))));
-      whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC);
+        whole.notes.push_back(fmt::format(
+            "The log's own {} tells how warm the surroundings are; --ambient is not used.", own_name(sink_of(whole))));
+      else
+        whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC);
     }
     forget_filled(whole);
     forget_glitches(whole);
