@@ -424,7 +424,8 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   choose(judged, judged.noise.disturbance_K > problem.noise.disturbance_K, margins, std::move(field), out);
   doing("looking at what the best leave");
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
-  const double lead = out.chosen.fit.chosen.size() == 1 ? margins.tie_alone : margins.tie;
+  const bool plain = out.chosen.fit.chosen.size() == 1 && problem.belief.known;
+  const double lead = plain ? margins.tie_alone : margins.tie;
   const double reach = left.complete ? lead : lead + left.gain;
   mark_ties(problem, left, lead, reach, margins, out);
   decide(problem, left, without_causes, reach, margins, out);

@@ -16,10 +16,11 @@ struct Margins {
   /// often for every two more.
   double detect = 13;
   double second = 10, tie = 6;  // a slow disturbance without a name is a rival as well
-  /// A cause alone that leads another cause alone by so much is named. With 6 here as well, 27 more of 1469 logs were a
-  /// tie that began with the truth, and 3 one that did not (duty and designed, seeds 72000 to 72019, as far as looked
-  /// at). Two causes together imitate what is in no table more often: their lead stays 6 (of 78 logs with the truth
-  /// taken out, seeds 81000 to 81002, 3 more would be named).
+  /// Of a motor with a sheet, a cause alone that leads others alone by so much is named. With 6 here as well, 27 more
+  /// of 1469 logs were a tie that began with the truth, and 3 one that did not (duty and designed, seeds 72000 to
+  /// 72019, as far as looked at). Elsewhere the lead stays 6: two causes together imitate what is in no table more
+  /// often (of 78 logs with the truth taken out, seeds 81000 to 81002, 3 more would be named), and without a sheet 3 of
+  /// 5 more names were wrong (of 224 logs, seeds 770, 91000 and 91001).
   double tie_alone = 3;
   /// Of a set where the housing is believed no closer than a model can be right. Of 36 whole boards with nothing hidden
   /// one gained 19.0 and the others too little to be asked (gain --clean, designed 5001 to 5016 and 5201 to 5208, duty
