@@ -91,7 +91,8 @@ TEST(Interrupts, NobodyWaitsLongerThanForABlockAndItsBetters) {
       EXPECT_EQ(pcb->door().axis[0].mode, firmware::Mode::running);
     } else {
       in(*pcb, 4.1e-6 * phase, [&] { pcb->chip.set_supply(2.8); });
-      // The NMI resets the chip: it comes once the longest wait allowed to the PVD, 200 instructions or 1.2 us, is over.
+      // The NMI resets the chip: it comes once the longest wait allowed to the PVD, 200 instructions or 1.2 us, is
+      // over.
       in(*pcb, 4.1e-6 * phase + 1.2e-6, [&] { pcb->chip.stop_hse(); });
       pcb->run_for(50e-6);
       EXPECT_EQ(pcb->chip.core().lane(pvd).calls, 1u);

@@ -709,6 +709,15 @@ TEST(ModelFile, ABoardGetsTheMostCautiousOfWhatIsNearlyAsGoodAsTheName) {
   says(all, "bears a push the shortest");
 }
 
+TEST(Search, WithoutASheetANameAsksForALargerLead) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Hidden log = hidden({.duty = tests::Duty::designed, .seed = 770112, .effects = {"constant_heat"}});
+  identify::Problem problem = identify::problem_of(log.logs, {});
+  EXPECT_EQ(identify::search(problem).verdict, Verdict::ambiguous);
+  problem.belief.known = true;
+  EXPECT_EQ(identify::search(problem).verdict, Verdict::explained) << "the leader leads by 3";
+}
+
 TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report =
