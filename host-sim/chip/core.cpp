@@ -32,7 +32,7 @@ void map_device(uc_engine* uc, std::uint32_t size, Bus* bus) {
   check(uc_mmio_map(uc, base, size, mmio_read<base>, bus, mmio_write<base>, bus));
 }
 
-/// What RAM holds at power-up is undefined (RM0090 does not say); ones are NaN to a float and far away to an integer.
+/// Nothing says what RAM holds at power-up; ones are NaN to a float and far away to an integer.
 constexpr std::uint8_t unwritten = 0xFF;
 
 }  // namespace
