@@ -260,25 +260,25 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
   return out;
 }
 
-/// Which sets are as good? What is left over may belong to any of them. Told are the next best and those that differ
-/// from the best by no more than twice what is left (Margins::left_apart).
-void mark_ties(const Problem& problem, const Left& left, double lead, double reach, const Margins& margins,
-               Search& out) {
-  const double by_noise_K = of_current_K(problem, margins);
+/// Which sets are as good, and which nearly, so that a board must not take them for excluded? What is left over may
+/// belong to any of them. Told are the next best and those that differ from the best by no more than twice what is left
+/// (Margins::left_apart).
+void mark_ties(const Problem& problem, const Left& left, double lead, const Margins& margins, Search& out) {
+  const double by_noise_K = of_current_K(problem, margins), slack = left.complete ? 0 : left.gain;
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
     const double behind = out.chosen.gain - c.gain;
-    c.likely = !c.chosen && behind < margins.tie;
-    if (c.chosen || (behind >= reach && by_noise_K == 0)) continue;
+    if (c.chosen || (behind >= margins.tie + slack && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
-    if (behind >= lead) {
-      const double apart_K = moved_K(problem, out.chosen.fit, c.fit);
-      const bool near = behind < reach && (out.tied.size() == 1 || apart_K <= margins.left_apart * left.after_K);
-      if (!near && !(apart_K < by_noise_K)) continue;
-    }
-    c.tied = c.likely = true;
-    out.tied.push_back(ids);
+    const double apart_K = moved_K(problem, out.chosen.fit, c.fit);
+    const bool near = out.tied.size() == 1 || apart_K <= margins.left_apart * left.after_K;
+    const auto within = [&](double margin) {
+      return behind < margin || (near && behind < margin + slack) || apart_K < by_noise_K;
+    };
+    c.likely = within(margins.tie);
+    c.tied = within(lead);
+    if (c.tied) out.tied.push_back(ids);
   }
 }
 
@@ -424,10 +424,10 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   choose(judged, judged.noise.disturbance_K > problem.noise.disturbance_K, margins, std::move(field), out);
   doing("looking at what the best leave");
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
-  const bool plain = out.chosen.fit.chosen.size() == 1 && problem.belief.known;
-  const double lead = plain ? margins.tie_alone : margins.tie;
+  const bool alone = out.chosen.fit.chosen.size() == 1;
+  const double lead = alone && problem.belief.known ? margins.tie_alone : margins.tie;
   const double reach = left.complete ? lead : lead + left.gain;
-  mark_ties(problem, left, lead, reach, margins, out);
+  mark_ties(problem, left, lead, margins, out);
   decide(problem, left, without_causes, reach, margins, out);
   doing("fitting what a board gets");
   refit_for_the_board(judged, margins, out);
