@@ -62,7 +62,7 @@ std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
 }
 
 void tell(const Problem& problem, const Search& found, Report& report) {
-  report.verdict = word(found.verdict);
+  report.verdict = found.verdict;
   if (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
   report.ladder = ladder_of(found);
@@ -321,6 +321,23 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
   return out;
 }
 
+/// The answer with each row's current taken for what flowed before it, where that is why the load is ahead. Half a row
+/// is averaged over (leeway.cpp). About one is a row's, and so is more where nothing remains of it then.
+std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log>& given,
+                                        const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                                        const Tell& doing) {
+  if (ahead_rows <= 0.6 || given.front().loaded_before) return std::nullopt;
+  std::vector<Log> sooner = given;
+  HoldOut held_sooner = held;
+  for (std::vector<Log>* some : {&sooner, &held_sooner.logs})
+    std::transform(some->begin(), some->end(), some->begin(), loaded_before);
+  Report report = discover(sooner, motor, held_sooner, doing);
+  const bool remains =
+      std::any_of(report.causes.begin(), report.causes.end(), [](const CauseLine& c) { return c.id == "clock_delay"; });
+  if (ahead_rows >= 1.4 && remains) return std::nullopt;
+  return report;
+}
+
 /// Why no board gets a set; empty when one does.
 std::string why_no_model(const Problem& problem, const std::string& poor) {
   if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
@@ -415,18 +432,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
-  // Half a row is averaged over (leeway.cpp). About one is a row's, and so is more where nothing remains of it then.
-  const double ahead = rows_ahead(problem, found.chosen.fit);
-  if (ahead > 0.6 && !given.front().loaded_before) {
-    std::vector<Log> sooner = given;
-    HoldOut held_sooner = held;
-    for (std::vector<Log>* some : {&sooner, &held_sooner.logs})
-      std::transform(some->begin(), some->end(), some->begin(), loaded_before);
-    Report by_rows = discover(sooner, motor, held_sooner, doing);
-    const bool remains = std::any_of(by_rows.causes.begin(), by_rows.causes.end(),
-                                     [](const CauseLine& c) { return c.id == "clock_delay"; });
-    if (ahead < 1.4 || !remains) return by_rows;
-  }
+  if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
   // more: of 33 such sets 8 did worse on another log (those of score's outside and removed rows, seeds 893 and 894).
@@ -437,8 +443,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   judge_baseline(problem, two, found.base.ratio, logs, motor, report);
   if (!extended) found.chosen.fit = two;
   if (!poor.empty()) {
-    found.verdict = Verdict::insufficient;
-    report.verdict = word(found.verdict);
+    report.verdict = found.verdict = Verdict::insufficient;
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);

@@ -121,24 +121,14 @@ struct Sums {
   Dual<N> with_averaged[Averaged::most] = {};  // products of residual and sensitivities with what is averaged over
 };
 
-/// What the filter predicts of a residual and of its sensitivities.
-template <int N>
-struct Predicted {
-  Dual<N> wander = 0, disturbance = 0;
-};
-
 /// Adds one channel's bin k of log l to the sums; n readings, 0: none.
 template <int N>
-void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& simulated, double measured, double n,
+void add(Sums<N>& sums, Whitener& w, Foretold<Dual<N>>& foretold, const Dual<N>& simulated, double measured, double n,
          const Averaged& averaged, std::vector<std::vector<double>> Leeway::*channel, std::size_t l, std::size_t k) {
-  const bool disturbed = w.disturbance2 > 0;
   if (n > 0) {
     w.reading(n);
-    Dual<N> e = simulated - measured - predicted.wander;
-    if (disturbed) e -= predicted.disturbance;
-    e *= w.weight;
-    predicted.wander += e * (w.gain / w.weight);
-    if (disturbed) predicted.disturbance += e * (w.gain_disturbed / w.weight);
+    Dual<N> e = simulated - measured;
+    foretold.whiten(w, e);
     sums.misfit += 0.5 * e.v * e.v;
     ++sums.readings;
     for (int i = 0; i < N; ++i) {
@@ -149,8 +139,7 @@ void add(Sums<N>& sums, Whitener& w, Predicted<N>& predicted, const Dual<N>& sim
       sums.with_averaged[i] += e * (averaged.effects[i].*channel)[l][k];
   }
   w.step();
-  predicted.wander *= w.keep;
-  if (disturbed) predicted.disturbance *= w.keep_disturbed;
+  foretold.step(w);
 }
 
 struct Evaluation {
@@ -206,7 +195,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
     };
     std::size_t begun = 1;
     Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
-    Predicted<N> of_housing, of_core;
+    Foretold<Dual<N>> of_housing{0, 0}, of_core{0, 0};
     bool finite = true;
     // A further node brings two coordinates.
     constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
@@ -215,7 +204,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
       const Dual<N> y1 = bin.core_n > 0 ? winding() : Dual<N>(0);
       while (begun < log.starts.size() && k == log.starts[begun].bin) {
         take_sums();
-        for (Predicted<N>* p : {&of_housing, &of_core}) {
+        for (Foretold<Dual<N>>* p : {&of_housing, &of_core}) {
           p->wander.forget(initial[begun].own);
           p->disturbance.forget(initial[begun].own);
         }
@@ -668,7 +657,7 @@ Replayed replayed(const Problem& problem, const Fit& f, std::size_t l) {
   Replayed out;
   Whitener white =
       log.has_housing ? Whitener::housing(problem.noise, log.width_s) : Whitener::core(problem.noise, log.width_s);
-  double wander = 0, disturbance = 0;
+  Foretold<double> foretold{0, 0};
   replay<4>(model, log, initial_states(problem, f, l), [&](std::size_t k, double y2, const auto& winding) {
     const Bin& bin = log.bins[k];
     const double y1 = winding();
@@ -679,15 +668,12 @@ Replayed replayed(const Problem& problem, const Fit& f, std::size_t l) {
     double w = missing;
     if (const double n = static_cast<double>(log.has_housing ? bin.housing_n : bin.core_n); n > 0) {
       white.reading(n);
-      const double residual_K = log.has_housing ? bin.housing_degC - y2 : bin.core_degC - y1;
-      w = (residual_K - wander - disturbance) * white.weight;
-      wander += white.gain * w / white.weight;
-      disturbance += white.gain_disturbed * w / white.weight;
+      w = log.has_housing ? bin.housing_degC - y2 : bin.core_degC - y1;
+      foretold.whiten(white, w);
     }
     out.whitened.push_back(w);
     white.step();
-    wander *= white.keep;
-    disturbance *= white.keep_disturbed;
+    foretold.step(white);
   });
   return out;
 }

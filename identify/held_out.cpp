@@ -95,7 +95,7 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOut& out,
   const double lasting_K = std::sqrt(sum2 / std::max(readings, 1.0));
   constexpr double far = 3, worth_K = 1;
   const double fitted_K = of(report.causes.empty() ? report.baseline_rmse : report.extended_rmse);
-  const bool answered = report.verdict != word(Verdict::unknown_cause) && report.verdict != word(Verdict::insufficient);
+  const bool answered = report.verdict != Verdict::unknown_cause && report.verdict != Verdict::insufficient;
   if (answered && !std::isnan(fitted_K) && lasting_K > std::max(worth_K, far * fitted_K))
     return fmt::format(
         "On what was held out, though, the {} is missed by {:.2f} K, where {:.2f} K were missed in the "

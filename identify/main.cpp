@@ -19,7 +19,7 @@
 
 namespace {
 
-using identify::Log;
+using identify::Log, identify::Verdict;
 using wire::pc::Exit;
 using wire::pc::UserError;
 
@@ -101,19 +101,14 @@ std::vector<std::string> truth_in(const std::string& path) {
   return ids;
 }
 
-bool names(const identify::Report& report) {
-  return report.verdict == "explained" || report.verdict == "partly_explained";
-}
-
 const char* outcome_of(const identify::Report& report, const std::vector<std::string>& named,
                        const std::vector<std::string>& truth) {
-  const std::string& verdict = report.verdict;
-  if (names(report)) return named == truth ? "named right" : "named wrong";
-  if (verdict == "ambiguous") {
+  if (identify::names_causes(report.verdict)) return named == truth ? "named right" : "named wrong";
+  if (report.verdict == Verdict::ambiguous) {
     const bool among = std::find(report.tied.begin(), report.tied.end(), truth) != report.tied.end();
     return among ? "tied with the truth" : "tied without it";
   }
-  if (verdict == "adequate") return truth.empty() ? "rightly silent" : "silent";
+  if (report.verdict == Verdict::adequate) return truth.empty() ? "rightly silent" : "silent";
   return "unknown or insufficient";
 }
 
@@ -158,8 +153,9 @@ int score(const Arguments& a, const identify::ColumnMap& map, const std::optiona
     const std::string hidden = fmt::format("{}", fmt::join(truth, " + ")),
                       name = fmt::format("{}", fmt::join(named, " + "));
     ++outcomes[outcome];
-    ++answers_to[hidden.empty() ? "nothing" : hidden][names(report) ? name : report.verdict];
-    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], hidden, report.verdict, name, outcome);
+    const std::string verdict = identify::word(report.verdict);
+    ++answers_to[hidden.empty() ? "nothing" : hidden][identify::names_causes(report.verdict) ? name : verdict];
+    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], hidden, verdict, name, outcome);
   }
   for (const auto& [outcome, count] : outcomes) fmt::print("{:>5}  {}\n", count, outcome);
   print_confusions(answers_to);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "identify/fit.hpp"
+#include "identify/search.hpp"
 #include "identify/structure.hpp"
 
 namespace identify {
@@ -88,9 +88,9 @@ struct Gain {
 inline constexpr const char* gauge_words =
     "all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be "
     "seen";
-std::string cause_heading(const std::string& verdict);  // "Behaves like"
-std::string nearest_words(const HeldOut& held_out);     // which has a nearest set
-std::string interval_words(const HeldOut& held_out);    // which has intervals
+std::string cause_heading(Verdict verdict);           // "Behaves like"
+std::string nearest_words(const HeldOut& held_out);   // which has a nearest set
+std::string interval_words(const HeldOut& held_out);  // which has intervals
 std::string whiteness_words(const Whiteness& of_residual);
 
 struct GainLine {
@@ -107,7 +107,7 @@ struct LogPlot {
 };
 
 struct Report {
-  std::string verdict;  // adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient
+  Verdict verdict = Verdict::insufficient;
   std::string sentence;
   std::string motor;
   std::vector<std::string> notes;   // on the data: masked, assumed, repaired

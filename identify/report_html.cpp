@@ -248,10 +248,11 @@ constexpr const char* style =
 }  // namespace
 
 std::string as_html(const Report& r) {
-  std::string s = "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>identify: " + escaped(r.verdict) +
-                  "</title><style>" + style + "</style></head><body>\n";
+  std::string s =
+      "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>identify: " + std::string(word(r.verdict)) +
+      "</title><style>" + style + "</style></head><body>\n";
   s += fmt::format("<h1>{}</h1>\n<p><span class='verdict {}'>{}</span> &nbsp; motor: {}</p>\n", escaped(r.sentence),
-                   r.verdict, r.verdict, escaped(r.motor));
+                   word(r.verdict), word(r.verdict), escaped(r.motor));
   if (!r.core_refusal.empty()) s += "<p class=warn>" + escaped(r.core_refusal) + "</p>\n";
   for (std::size_t l = 0; l < r.plots.size(); ++l) s += inlined(picture(r, l), l) + "\n";
   s += candidates(r) + named(r) + errors(r) + worth(r) + where(r) + two_resistors(r) + advised(r);

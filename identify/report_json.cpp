@@ -39,7 +39,7 @@ double worst(const Rmse& r) {
 std::string as_json(const Report& r) {
   ordered_json out;
   out["format"] = 1;
-  out["verdict"] = r.verdict;
+  out["verdict"] = word(r.verdict);
   out["sentence"] = r.sentence;
   out["motor"] = r.motor;
   out["notes"] = r.notes;

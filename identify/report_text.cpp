@@ -127,10 +127,10 @@ std::string advised(const Report& r) {
 
 }  // namespace
 
-std::string cause_heading(const std::string& verdict) {
-  return verdict == "ambiguous"          ? "May behave like"
-         : verdict == "partly_explained" ? "Behaves mostly like"
-                                         : "Behaves like";
+std::string cause_heading(Verdict verdict) {
+  return verdict == Verdict::ambiguous          ? "May behave like"
+         : verdict == Verdict::partly_explained ? "Behaves mostly like"
+                                                : "Behaves like";
 }
 
 std::string nearest_words(const HeldOut& h) {
@@ -170,7 +170,7 @@ std::vector<GainLine> gain_lines(const Gain& g) {
 }
 
 std::string as_text(const Report& r, bool explain) {
-  std::string s = fmt::format("{}\n\nVerdict: {}      Motor: {}\n", r.sentence, r.verdict, r.motor);
+  std::string s = fmt::format("{}\n\nVerdict: {}      Motor: {}\n", r.sentence, word(r.verdict), r.motor);
   for (const std::string& note : r.notes) s += "  note: " + note + "\n";
   s += two_resistors(r) + variants(r) + where(r) + candidates(r) + named(r) + unseen(r) + worth(r) + advised(r);
   if (explain) {

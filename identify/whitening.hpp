@@ -24,6 +24,7 @@ struct Whitener {
     return {n, n.core_white_K, n.core_slow_K, n.disturbance_K * n.core_slow_K / n.housing_slow_K, step_s};
   }
 
+  bool disturbed() const { return disturbance2 > 0; }
   void reading(double n) {
     const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + 1e-8;
     gain = a / S;
@@ -49,6 +50,25 @@ struct Whitener {
         P(wander2),
         P_both(0),
         P_disturbed(disturbance2) {}
+};
+
+/// What a channel's filter foretells of a residual, or of what goes along with it: its sensitivities, ordinary effects.
+template <class T>
+struct Foretold {
+  T wander, disturbance;
+
+  /// Makes the residual of the present reading white, and learns from it.
+  void whiten(const Whitener& w, T& residual) {
+    residual -= wander;
+    if (w.disturbed()) residual -= disturbance;
+    residual *= w.weight;
+    wander += residual * (w.gain / w.weight);
+    if (w.disturbed()) disturbance += residual * (w.gain_disturbed / w.weight);
+  }
+  void step(const Whitener& w) {
+    wander *= w.keep;
+    if (w.disturbed()) disturbance *= w.keep_disturbed;
+  }
 };
 
 /// What whitened readings see of the ordinary effects S that a fit averages over, a column each, or one for each log
@@ -89,22 +109,19 @@ struct Averaged {
     const auto n = static_cast<Eigen::Index>(effects.size());
     std::vector<Eigen::Index> at;
     for (std::size_t i = 0; i < effects.size(); ++i) at.push_back(column(i, l));
-    Eigen::VectorXd wander = Eigen::VectorXd::Zero(n), disturbance = wander, s = wander;
+    Eigen::VectorXd s = Eigen::VectorXd::Zero(n);
+    Foretold<Eigen::VectorXd> foretold{s, s};
     Eigen::MatrixXd of_log = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t k = 0; k < log.bins.size(); ++k) {
       if (log.bins[k].*readings > 0) {
         w.reading(static_cast<double>(log.bins[k].*readings));
-        for (Eigen::Index i = 0; i < n; ++i) {
-          double& K = (effects[static_cast<std::size_t>(i)].*channel)[l][k];
-          s[i] = K = (K - wander[i] - disturbance[i]) * w.weight;
-        }
-        wander += w.gain / w.weight * s;
-        disturbance += w.gain_disturbed / w.weight * s;
+        for (Eigen::Index i = 0; i < n; ++i) s[i] = (effects[static_cast<std::size_t>(i)].*channel)[l][k];
+        foretold.whiten(w, s);
+        for (Eigen::Index i = 0; i < n; ++i) (effects[static_cast<std::size_t>(i)].*channel)[l][k] = s[i];
         of_log += s * s.transpose();
       }
       w.step();
-      wander *= w.keep;
-      disturbance *= w.keep_disturbed;
+      foretold.step(w);
     }
     sum(at, at) += of_log;
   }

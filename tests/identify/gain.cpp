@@ -77,12 +77,12 @@ Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::st
   const auto known = [&](std::size_t i, double truth) {
     return Known{found[i].value / truth - 1, found[i].std_error / found[i].value};
   };
-  const bool named = report.verdict.ends_with("explained");
+  const bool named = identify::names_causes(report.verdict);
   Case c{.seed = seed,
          .truth = clean ? "nothing" : nlohmann::json::parse(motor.truth_json)["causes"][0]["id"],
-         .answer = report.verdict,
+         .answer = identify::word(report.verdict),
          .named = named,
-         .misnamed = clean ? report.verdict != "adequate" : named,
+         .misnamed = clean ? report.verdict != identify::Verdict::adequate : named,
          .before = outcome(before),
          .after = outcome(after),
          .R1 = known(0, motor.motor.R1_K_per_W),

@@ -28,6 +28,7 @@
 namespace {
 
 using nlohmann::json;
+using identify::Verdict;
 using tests::says;
 
 identify::Report report_of(const tests::BenchOptions& options, const identify::HoldOut& held = {}) {
@@ -140,7 +141,7 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
     identify::HoldOut held;
     held.logs = tests::bench_logs({held_out});
     const identify::Report report = identify::discover(tests::bench_logs({fitted}), tests::ec_16(), held);
-    EXPECT_NE(report.verdict, "unknown_cause");
+    EXPECT_NE(report.verdict, Verdict::unknown_cause);
     const json told = json::parse(identify::as_json(report))["held_out"]["against"];
     EXPECT_EQ(told.is_null(), report.sentence.find("held out") == std::string::npos) << told;
     return report.sentence;
@@ -197,12 +198,12 @@ TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   other.power_gain = 1.4;  // recorded over true
   other.seed = 2;
   const identify::Report report = identify::discover(tests::bench_logs({one, other}), tests::ec_16());
-  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
   ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
   EXPECT_EQ(report.causes[0].id, "power_share");
   EXPECT_NEAR(std::abs(std::log(report.causes[0].parameters[0].value)), std::log(1.4), 0.02);
   other.power_gain = 1;
-  EXPECT_EQ(identify::discover(tests::bench_logs({one, other}), tests::ec_16()).verdict, "adequate");
+  EXPECT_EQ(identify::discover(tests::bench_logs({one, other}), tests::ec_16()).verdict, Verdict::adequate);
 }
 
 TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
@@ -210,7 +211,7 @@ TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
   options.core_every_s = 20;
   options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
   const identify::Report report = report_of(options);
-  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
   ASSERT_TRUE(report.gain);
   EXPECT_LT(report.gain->overshoot_after_K, 0.5) << "the model that is the motor keeps its limit";
   EXPECT_GT(report.gain->burst_s_after, 0);
@@ -290,10 +291,10 @@ TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
   options.seconds = 1800;
   options.start_degC = 40;
   auto logs = tests::bench_logs({options});
-  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate);
   logs[0].of(identify::Role::ambient).clear();
   const identify::Report report = identify::discover(logs, tests::ec_16());
-  ASSERT_NE(report.verdict, "adequate");
+  ASSERT_NE(report.verdict, Verdict::adequate);
   says(report.sentence, "No ambient was recorded: a room that is not as warm as what the log begins at");
   EXPECT_EQ(report.model_toml.find("gain = -"), std::string::npos) << "heat out of the housing, for a board";
 }
@@ -305,13 +306,13 @@ TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
     return std::fmod(t, 1 / 1.3) < 0.3 && std::fmod(t, 120) < 60 ? 4.0 : 0.0;
   };
   auto logs = tests::bench_logs({options});
-  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate);
   for (auto& column : logs[0].columns) {  // a row a second
     for (std::size_t i = 0; 10 * i < column.size(); ++i) column[i] = column[10 * i];
     column.resize(column.size() / 10);
   }
   const identify::Report report = identify::discover(logs, tests::ec_16());
-  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
 }
 
@@ -323,10 +324,10 @@ TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
     return hold_A + 0.03 * std::normal_distribution<double>()(random);
   };
   auto logs = tests::bench_logs({options});
-  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, "adequate");
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate);
   for (double& amps : logs[0].of(identify::Role::current)) amps = std::min(amps, 3.0);
   const identify::Report report = identify::discover(logs, tests::ec_16());
-  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "current_A stands at its largest value, 3, in 2400 rows and is noisy elsewhere");
 }
 
@@ -345,7 +346,7 @@ TEST(Report, WhatIsAdequateHasNothingToGain) {
   tests::BenchOptions options;
   options.core_every_s = 20;
   const identify::Report report = report_of(options);
-  EXPECT_EQ(report.verdict, "adequate");
+  EXPECT_EQ(report.verdict, Verdict::adequate);
   EXPECT_FALSE(report.gain);
 }
 
@@ -490,7 +491,7 @@ TEST(Report, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
   options.seconds = 1200;
   options.extra_housing_W = [](double, double, double) { return -0.54; };  // into a colder frame
   const identify::Report report = report_of(options);
-  ASSERT_EQ(report.verdict, "explained") << report.sentence;
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
   EXPECT_GT(report.baseline[2].value, 4 * tests::ec_16().motor.C1_J_per_K);
   says(report.sentence, "misses the winding, whose readings are noisy by 1.");
   EXPECT_EQ(identify::as_text(report, false).find("-0.0 "), std::string::npos) << "in the ladder";
@@ -527,7 +528,7 @@ TEST(Report, ARowsLoadMayBeWhatFlowedBeforeIt) {
   options.core_white_K = 0.1;
   const auto said = [](const std::vector<identify::Log>& logs) {
     const identify::Report report = identify::discover(logs, std::nullopt);
-    return report.verdict + ": " + report.notes.front();
+    return identify::word(report.verdict) + (": " + report.notes.front());
   };
   auto logs = tests::bench_logs({options});
   says(said(logs), "adequate: No motor file");
@@ -760,14 +761,14 @@ TEST(Traction, AMinuteSaysNothingOfAMotorWithoutASheet) {
   auto logs = tests::traction_drives("hotcore_minute.csv", 44);
   for (auto& column : logs[0].columns) column.resize(std::min<std::size_t>(column.size(), 120));
   const identify::Report report = identify::discover(logs, std::nullopt);
-  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "does not come near where it settles");
 }
 
 TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const identify::Report report = foretold(37);
-  EXPECT_EQ(report.verdict, "ambiguous") << report.sentence;
+  EXPECT_EQ(report.verdict, Verdict::ambiguous) << report.sentence;
   EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
   const auto hot_spot =
       std::find_if(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.id == "hot_spot"; });
@@ -784,7 +785,7 @@ TEST(Traction, TwoHoursAreNotTooShortForAHousingThatSettlesWithinMinutes) {
 TEST(Traction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const identify::Report report = foretold(4);
-  EXPECT_EQ(report.verdict, "unknown_cause") << report.sentence;
+  EXPECT_EQ(report.verdict, Verdict::unknown_cause) << report.sentence;
   EXPECT_TRUE(report.causes.empty());
   EXPECT_EQ(report.held_out->nearest.size(), 2u);
   EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);

@@ -693,16 +693,16 @@ identify::Report report_of(const tests::HiddenLogOptions& o) {
 TEST(ModelFile, ABoardGetsAHotSpotThatIsTooSmallToName) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto nothing = report_of({.seed = 5003}), small = report_of({.seed = 5003, .effects = {"hot_spot"}});
-  EXPECT_EQ(nothing.verdict, "adequate");
+  EXPECT_EQ(nothing.verdict, Verdict::adequate);
   EXPECT_EQ(nothing.model_toml.find("hot spot"), std::string::npos);
-  ASSERT_EQ(small.verdict, "adequate");
+  ASSERT_EQ(small.verdict, Verdict::adequate);
   says(small.model_toml, "hot spot");
 }
 
 TEST(ModelFile, ABoardGetsTheMostCautiousOfWhatIsNearlyAsGoodAsTheName) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.core = tests::Core::none, .seed = 72004252, .effects = {"speed_loss_quadratic"}});
-  ASSERT_EQ(report.verdict, "explained");
+  ASSERT_EQ(report.verdict, Verdict::explained);
   EXPECT_EQ(report.tied, (std::vector<std::vector<std::string>>{{"speed_loss_quadratic"}}));
   std::string all;
   for (const std::string& step : report.reasoning) all += step + "\n";
@@ -722,7 +722,7 @@ TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report =
       report_of({.core = tests::Core::none, .seed = 770529, .effects = {"radiation"}, .mostly_small = true});
-  ASSERT_EQ(report.verdict, "unknown_cause");
+  ASSERT_EQ(report.verdict, Verdict::unknown_cause);
   EXPECT_TRUE(report.tied.empty()) << "no name";
   says(report.sentence, "radiation would explain it, and so would a slow disturbance without a name");
   says(report.notes.back(), "What would tell whether it is radiation");
@@ -731,7 +731,7 @@ TEST(Report, WhatWouldExplainALogAndIsTooLittleForANameIsToldAsSuch) {
 TEST(Report, WhatAWindingTooNoisyHidesIsToldOfTheHousing) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.seed = 770395, .effects = {"bridge_loss"}});
-  ASSERT_EQ(report.verdict, "explained");
+  ASSERT_EQ(report.verdict, Verdict::explained);
   EXPECT_GT(report.extended_rmse.core_K, 0.95 * report.baseline_rmse.core_K);
   says(report.sentence, "the two-resistor model misses the housing");
 }
@@ -739,7 +739,7 @@ TEST(Report, WhatAWindingTooNoisyHidesIsToldOfTheHousing) {
 TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
-  ASSERT_EQ(report.verdict, "unknown_cause");
+  ASSERT_EQ(report.verdict, Verdict::unknown_cause);
   says(report.model_toml, "power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n");
 }
 
@@ -760,10 +760,10 @@ TEST(Report, TwoClocksTwoMinutesApartAreToldByHowMuch) {
 TEST(Report, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 11, .effects = {"windage"}});
-  EXPECT_TRUE(identify::discover(log.logs, log.log.sheet).verdict.ends_with("explained"));
+  EXPECT_TRUE(identify::names_causes(identify::discover(log.logs, log.log.sheet).verdict));
   std::swap(log.logs[0].of(identify::Role::core), log.logs[0].of(identify::Role::housing));
   const auto report = identify::discover(log.logs, log.log.sheet);
-  EXPECT_EQ(report.verdict, "insufficient");
+  EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "core_degC and housing_degC are swapped");
 }
 

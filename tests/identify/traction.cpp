@@ -47,15 +47,17 @@ int main(int argc, char** argv) {
     const double two_K = report.held_out->before.core_K, found_K = report.held_out->after.core_K;
     before.push_back(two_K);
     after.push_back(found_K);
-    answered += report.verdict != "unknown_cause" && report.verdict != "insufficient";
+    answered += report.verdict != identify::Verdict::unknown_cause && report.verdict != identify::Verdict::insufficient;
     kept += found_K <= most_K;
     kept_by_two += two_K <= most_K;
     std::string tied;
     for (const auto& ids : report.tied) tied += fmt::format(" {}", fmt::join(ids, "+"));
-    list.push_back(
-        {{"seed", seed}, {"verdict", report.verdict}, {"unseen_winding_K", {two_K, found_K}}, {"sets", tied}});
+    list.push_back({{"seed", seed},
+                    {"verdict", identify::word(report.verdict)},
+                    {"unseen_winding_K", {two_K, found_K}},
+                    {"sets", tied}});
     fmt::print(stderr, "{:>3}/{} seed {:<8} {:<17} unseen winding {:6.2f} -> {:5.2f} K {}\n", s + 1, seeds, seed,
-               report.verdict, two_K, found_K, tied);
+               identify::word(report.verdict), two_K, found_K, tied);
   }
   const auto worst = [](const std::vector<double>& of) { return *std::max_element(of.begin(), of.end()); };
   if (json)
