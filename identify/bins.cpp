@@ -108,11 +108,12 @@ Inputs inputs_of(const Log& log, Bins& out) {
   std::vector<double> sink;
   if (log.has(sink_of(log))) {
     sink = bridged(log.of(sink_of(log)), t);
+    out.sink_unwatched = log.sink_typed;
     if (sink_of(log) == Role::coolant) out.notes.push_back("The coolant is taken as the sink.");
   } else {
     const double first = std::isnan(log.sink_degC) ? first_degC(log) : log.sink_degC;
     sink.assign(t.size(), first);
-    out.sink_assumed = true;
+    out.sink_assumed = out.sink_unwatched = true;
     out.notes.push_back(fmt::format(
         "No ambient temperature was recorded; what the log begins at, {:.1f} degC, is taken for it.", first));
   }

@@ -56,8 +56,9 @@ struct Bins {
   std::string name;
   double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
-  bool torque_for_A = false;  // as in Log
-  bool sink_assumed = false;  // to be as warm as what the log begins at
+  bool torque_for_A = false;    // as in Log
+  bool sink_assumed = false;    // to be as warm as what the log begins at
+  bool sink_unwatched = false;  // or as a person said once: how it moved is not known
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
   std::vector<Start> starts = {Start{}};                        // the first at bin 0
   double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences

@@ -186,7 +186,7 @@ std::string not_tried(const Problem& problem, const std::vector<Log>& logs) {
 }
 
 /// A room whose temperature was typed in, and warms, looks like a mass, a drift or another cooling.
-void note_typed_ambient(const std::vector<Log>& logs, Report& report) {
+void note_still_ambient(const std::vector<Log>& logs, Report& report) {
   const auto moves = [](const Log& log) {
     double low = 1e300, high = -1e300;
     for (const double x : log.of(sink_of(log))) {
@@ -194,7 +194,8 @@ void note_typed_ambient(const std::vector<Log>& logs, Report& report) {
     }
     return high > low;
   };
-  const bool recorded = std::any_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(sink_of(log)); });
+  const bool recorded =
+      std::any_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(sink_of(log)) && !log.sink_typed; });
   if (recorded && std::none_of(logs.begin(), logs.end(), moves))
     report.notes.push_back(
         "The recorded ambient never moves; a room that warms unmeasured looks like a third mass, a drift or a "
@@ -450,7 +451,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   } else {
     report.extended_rmse = rmse_of(problem, found.chosen.fit);
     tell(problem, found, report);
-    if (found.verdict != Verdict::adequate) note_typed_ambient(logs, report);
+    if (found.verdict != Verdict::adequate) note_still_ambient(logs, report);
     const std::string untried = not_tried(problem, logs);
     if (!untried.empty())
       (found.verdict == Verdict::unknown_cause ? report.notes : report.reasoning).push_back(untried);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace identify {
 namespace {
@@ -28,6 +29,12 @@ const double ordinary_ripple_share = 1 / std::sqrt(12.0);
 /// (designed, hidden motor 4110).
 constexpr double ordinary_load_share = 0.002;
 
+/// How far a room that nobody watched moves while a log is recorded, a standard deviation: in half a wave over the
+/// log; in n halves by the root of n less. Heating that is regulated holds a room to some tenths of a kelvin. All along
+/// it is as much warmer or cooler than what is taken for it.
+constexpr double ordinary_room_K = 0.3;
+constexpr int room_waves = 4;
+
 /// How well a winding that its resistance tells is known where its reference was taken. The middle half of normal
 /// readings tells their mean to 1.1 times what all of them do. The housing is read as often or more, but what it
 /// wanders by, or where between its steps it stood, is the same for the whole of a rest.
@@ -49,6 +56,27 @@ std::vector<double> off_by_reference_K(std::vector<double> core_degC, const Nois
 std::vector<double> apart_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
   for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
   return moved;
+}
+
+/// What the readings are moved by where unwatched rooms move in `halves` half waves over their logs.
+Leeway leeway_of_rooms(const Problem& problem, const Fit& motor, int halves) {
+  Problem moved = problem;
+  for (Bins& log : moved.logs) {
+    for (std::size_t k = 0; k < log.bins.size() && log.sink_unwatched; ++k) {
+      const double share = (static_cast<double>(k) + 0.5) / static_cast<double>(log.bins.size());
+      const double room_K =
+          ordinary_room_K / std::sqrt(std::max(1, halves)) * std::cos(std::numbers::pi * halves * share);
+      log.bins[k].input[thermal::Boundary::ambient] += room_K;
+    }
+  }
+  Leeway out;
+  out.of_each_log = true;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Replayed still = replayed(problem, motor, l), moving = replayed(moved, motor, l);
+    out.housing_K.push_back(apart_K(moving.housing_degC, still.housing_degC));
+    out.core_K.push_back(apart_K(moving.core_degC, still.core_degC));
+  }
+  return out;
 }
 
 /// The motor that a fit found, without its causes.
@@ -121,6 +149,10 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   if (problem.noise.core_slow_K > 0) out.insert(out.end(), {ahead, moment});
   if (ripples && !problem.heated_by_power()) out.push_back(ripple);
   if (by_resistance) out.push_back(reference);
+  const bool unwatched =
+      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.sink_unwatched; });
+  for (int halves = 0; unwatched && halves <= room_waves; ++halves)
+    out.push_back(leeway_of_rooms(problem, motor, halves));
   return out;
 }
 

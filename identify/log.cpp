@@ -12,6 +12,7 @@
 #include "identify/masks.hpp"
 #include "identify/median.hpp"
 #include "identify/pauses.hpp"
+#include "identify/rows.hpp"
 #include "identify/units.hpp"
 #include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
@@ -25,11 +26,17 @@ using wire::pc::UserError;
 [[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
 
 const std::array<std::string, role_count>& own_names() {
-  static const std::array<std::string, role_count> names = {
-      "time_s",       "current_A",       "id_A",         "iq_A",       "power_W",
-      "torque_Nm",    "speed_rad_per_s", "bus_V",        "bus_A",      "core_degC",
-      "housing_degC", "ambient_degC",    "coolant_degC", "frame_degC", "neighbour_housing_degC",
-      "board_degC",   "winding_ohm",     "session"};
+  static const std::array<std::string, role_count> names = {"time_s",       "current_A",
+                                                            "id_A",         "iq_A",
+                                                            "phase_a_A",    "phase_b_A",
+                                                            "phase_c_A",    "power_W",
+                                                            "torque_Nm",    "speed_rad_per_s",
+                                                            "bus_V",        "bus_A",
+                                                            "core_degC",    "housing_degC",
+                                                            "ambient_degC", "coolant_degC",
+                                                            "frame_degC",   "neighbour_housing_degC",
+                                                            "board_degC",   "winding_ohm",
+                                                            "session"};
   return names;
 }
 
@@ -103,6 +110,18 @@ void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Sour
   }
 }
 
+/// Some few words among a column's numbers say that nothing was read, as OL and Error do; else the first is refused.
+void take_words(const Table& table, std::size_t column, Role role, std::vector<std::string>& notes) {
+  constexpr double few = 0.05;  // of the numbers
+  const Words& words = table.words[column];
+  const std::size_t count = words.count();
+  if (count == 0 || role == Role::session) return;
+  if (words.like_numbers || static_cast<double>(count) > few * static_cast<double>(count_told(table.columns[column])))
+    refuse(table.complaints[column]);
+  notes.push_back(fmt::format("Cells of column '{}' with a word in them ('{}') count as not read: {}.",
+                              table.names[column], words.seen.front(), count));
+}
+
 /// Where each role comes from, and in which unit; a note says which units nobody typed.
 std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::vector<std::string>& notes) {
   std::map<Role, Source> found = from_map(table, map);
@@ -117,8 +136,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
       refuse(
           fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
-    const std::string& complaint = table.complaints[index_of(table, source)];
-    if (!complaint.empty()) refuse(complaint);
+    take_words(table, index_of(table, source), role, notes);
     if (source.unit_said) continue;
     std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
@@ -162,12 +180,48 @@ double lowest(const std::vector<double>& v) {
 /// beyond any board this project drives or any traction log it was shown.
 double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 40 * motor->rated_current_A : 1000; }
 
+/// What a logger writes for a sensor that does not answer, -999 or -32768, is no temperature.
+void forget_impossible(Log& log) {
+  constexpr double zero_K_degC = -273.15, few = 0.05;  // of the readings: more are another unit
+  for (const Role role : temperatures) {
+    const auto impossible =
+        std::count_if(log.of(role).begin(), log.of(role).end(), [](double x) { return x < zero_K_degC; });
+    if (impossible == 0 || static_cast<double>(impossible) > few * static_cast<double>(count_told(log.of(role))))
+      continue;
+    log.notes.push_back(
+        fmt::format("{} is below 0 K in {} rows, which count as not read.", own_name(role), impossible));
+    std::replace_if(
+        log.of(role).begin(), log.of(role).end(), [](double x) { return x < zero_K_degC; }, missing);
+  }
+}
+
+/// Deviations from a mean, or shares of a range, as data sets for machine learning have them, in all columns.
+void check_normalised(const Log& log) {
+  constexpr double most = 6;  // standard deviations, or what they would be in A, rad/s and degC: no use
+  const auto told_small = [&](const auto& roles) {
+    double largest = 0;
+    for (const Role role : roles) largest = std::max(largest, largest_magnitude(log.of(role)));
+    return largest > 0 && largest <= most;
+  };
+  if (told_small(temperatures) && told_small(load_roles))
+    refuse(
+        fmt::format("{}: no column, temperatures and load, exceeds {:g}, as if they were normalised; give them as "
+                    "they were measured, in degC, A and rad/s.",
+                    log.name, most));
+}
+
 /// Units that a header did not tell: values that no motor shows.
 void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
+  check_normalised(log);
   for (const Role role : temperatures) {
     if (!log.has(role)) continue;
     const double low = lowest(log.of(role));
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
+    if (low > 450)
+      refuse(
+          fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say --column "
+                      "{}=COLUMN:0.01degC (or what one is worth).",
+                      log.name, own_name(role), low, own_name(role)));
     if (low > 200)
       refuse(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
                          log.name, own_name(role), low, own_name(role)));
@@ -198,6 +252,41 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
                       log.name, own_name(role), peak, most_A));
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
+}
+
+/// The direct current that heats alike, of the currents of the phases at each moment: 2 R i^2 = R (a^2 + b^2 + c^2).
+/// Two of them tell the third, for a motor's star has no fourth wire.
+void read_phases(Log& log) {
+  std::vector<Role> told;
+  for (const Role role : {Role::phase_a, Role::phase_b, Role::phase_c}) {
+    if (log.has(role)) told.push_back(role);
+  }
+  if (told.empty() || log.has(Role::current) || log.has(Role::power)) return;
+  const bool alternate = std::all_of(told.begin(), told.end(), [&](Role role) {
+    return std::any_of(log.of(role).begin(), log.of(role).end(), [](double A) { return A < 0; });
+  });
+  if (told.size() == 1 || (told.size() == 2 && !alternate))
+    refuse(fmt::format(
+        "{}: {} {} how much flows; map all three phases (phase_a_A, phase_b_A, phase_c_A).", log.name,
+        own_name(told.front()),
+        alternate ? "alternates and does not tell" : "is an effective value and with one other does not tell"));
+  std::vector<double>& current = log.of(Role::current);
+  for (std::size_t i = 0; i < log.of(Role::time).size(); ++i) {
+    double sum_A = 0, sum_A2 = 0;
+    for (const Role role : told) sum_A += log.of(role)[i], sum_A2 += log.of(role)[i] * log.of(role)[i];
+    if (told.size() == 2) sum_A2 += sum_A * sum_A;
+    current.push_back(std::sqrt(sum_A2 / 2));
+  }
+  for (const Role role : told) log.of(role).clear();
+  log.notes.push_back("current_A is taken from the phases: the root of half the sum of their squares.");
+}
+
+/// Is a column called like one phase, ia or I_U?
+bool called_like_a_phase(const std::string& column) {
+  std::string name = in_small(column.substr(0, column.find_first_of(" [(")));
+  std::erase(name, '_');
+  if (name.starts_with("phase")) name.replace(0, 5, "i");
+  return name.size() == 2 && name[0] == 'i' && std::string_view("abcuvw").find(name[1]) != std::string_view::npos;
 }
 
 /// Robots' logs often have a joint's torque and no current.
@@ -463,7 +552,8 @@ void note_unused(Log& log) {
     }
     return there;
   };
-  std::vector<std::string> unused = names({Role::torque, Role::bus_V, Role::bus_A, Role::board});
+  std::vector<std::string> unused =
+      names({Role::phase_a, Role::phase_b, Role::phase_c, Role::torque, Role::bus_V, Role::bus_A, Role::board});
   if (log.has(Role::winding_ohm) && log.has(Role::core)) unused.push_back(own_name(Role::winding_ohm));
   if (log.has(Role::power)) {
     const auto currents = names({Role::current, Role::id, Role::iq});
@@ -479,17 +569,57 @@ void note_unused(Log& log) {
     log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
 }
 
-/// The rows of each session; one without a name where none are told apart.
-using Sessions = std::map<double, std::vector<std::size_t>>;
+/// The first column whose name has one of these in it, as a command line takes it; NAME where none has.
+std::string likely_column(const Table& table, const std::vector<const char*>& parts) {
+  for (const std::string& name : table.names) {
+    const std::string low = in_small(name);
+    if (std::any_of(parts.begin(), parts.end(), [&](const char* p) { return low.find(p) != std::string::npos; }))
+      return name.find_first_of(" ()[]'&;$*?") == std::string::npos ? name : "\"" + name + "\"";
+  }
+  return "NAME";
+}
+
+/// All that is missing at once, each with the column that its name speaks for.
+void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
+  struct Need {
+    std::vector<Role> any_of;
+    const char *what, *hint;
+    std::vector<const char*> names;  // parts of likely ones, in small letters
+  };
+  const Need needs[] = {{{Role::time},
+                         "a time column",
+                         "call it time_s, say --column time_s={}, or --period S where the rows are S seconds apart",
+                         {"time", "zeit", "stamp"}},
+                        {{Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque},
+                         "the heat input (current_A, iq_A, power_W or torque_Nm)",
+                         "map it with --column current_A={}",
+                         {"current", "curr", "strom", "amp"}},
+                        {{Role::housing, Role::core},
+                         "a measured temperature (housing_degC or core_degC)",
+                         "map it with --column housing_degC={}",
+                         {"temp", "degc", "\u00b0c", "t_"}}};
+  std::vector<std::string> missing_ones, hints;
+  for (const Need& need : needs) {
+    if ((by_row && need.any_of.front() == Role::time) ||
+        std::any_of(need.any_of.begin(), need.any_of.end(), [&](Role r) { return found.contains(r); }))
+      continue;
+    missing_ones.emplace_back(need.what);
+    hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.names)));
+  }
+  if (!missing_ones.empty())
+    refuse(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
+                       missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), fmt::join(table.names, ", ")));
+}
 
 /// A column of the time since the first row of a session, of rows that are a period apart.
-Source give_clock(Table& table, const Sessions& sessions, double period_s) {
+Source give_clock(Table& table, const std::vector<Session>& sessions, double period_s) {
   std::vector<double> time_s(table.rows(), missing);
-  for (const auto& [key, rows] : sessions) {
+  for (const auto& [name, rows] : sessions) {
     for (std::size_t i = 0; i < rows.size(); ++i) time_s[rows[i]] = static_cast<double>(i) * period_s;
   }
   table.names.push_back("--period");
   table.columns.push_back(std::move(time_s));
+  table.words.emplace_back();
   table.of_day.push_back(false);
   return {table.names.back()};
 }
@@ -532,9 +662,19 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
+  read_phases(log);
   if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
     refuse(name +
            ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
+  for (const Role role : {Role::current, Role::iq}) {
+    const auto source = found.find(role);
+    const auto alternates = [&] { return lowest(log.of(role)) < -0.5 * largest_magnitude(log.of(role)); };
+    if (source != found.end() && called_like_a_phase(source->second.column) && alternates())
+      refuse(
+          fmt::format("{}: column '{}' is called like one phase, whose current alternates; map all of them "
+                      "(--column phase_a_A={} and phase_b_A, phase_c_A).",
+                      name, source->second.column, source->second.column));
+  }
   check_epoch(log, time[rows.front()]);
   if (table.of_day[time_column]) pass_midnights(log);
   check_time(table, log, rows);
@@ -634,48 +774,44 @@ Log loaded_before(Log log) {
 }
 
 std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
-  std::vector<std::string> unit_notes;
+  std::vector<std::string> unit_notes = table.notes;
+  keep_rows(table, map.rows);
   auto found = resolve(table, map, unit_notes);
-  const auto need = [&](bool there, const std::string& what, const std::string& hint) {
-    if (!there)
-      refuse(fmt::format("{}: {} is missing; {}. The file has: {}.", table.file, what, hint,
-                         fmt::join(table.names, ", ")));
-  };
   const auto has = [&](Role r) { return found.contains(r); };
   const bool by_row = !std::isnan(map.period_s);
   if (by_row && has(Role::time))
     throw UserError(Exit::usage, fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.",
                                              table.file, found.at(Role::time).column));
-  need(by_row || has(Role::time), "a time column",
-       "call it time_s, say --column time_s=NAME, or --period S where the rows are S seconds apart");
-  need(has(Role::current) || has(Role::iq) || has(Role::power) || has(Role::torque),
-       "the heat input (current_A, iq_A, power_W or torque_Nm)", "map it with --column current_A=NAME");
-  need(has(Role::housing) || has(Role::core), "a measured temperature (housing_degC or core_degC)",
-       "map it with --column housing_degC=NAME");
-
-  Sessions sessions;
-  std::size_t in_a_session = 0;
-  const std::vector<double>* session =
-      has(Role::session) ? &table.columns[index_of(table, found.at(Role::session))] : nullptr;
-  for (std::size_t r = 0; r < table.rows(); ++r) {
-    const double key = session == nullptr ? 0 : (*session)[r];
-    if (!std::isnan(key)) sessions[key].push_back(r), ++in_a_session;
+  refuse_without_columns(table, found, by_row);
+  std::vector<std::size_t> known;
+  for (const auto& [role, source] : found) {
+    if (role != Role::session) known.push_back(index_of(table, source));
   }
+  const auto first_of = [&](std::initializer_list<Role> roles) {
+    return index_of(table, found.at(*std::find_if(roles.begin(), roles.end(), has)));
+  };
+  const std::string several = several_motors(
+      table, first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
+      first_of({Role::housing, Role::core}), known);
+  if (!several.empty()) refuse(several);
+  const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
+  const std::vector<Session> sessions = sessions_of(table, session);
   if (sessions.empty())
     refuse(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
                        table.file, found.at(Role::session).column));
   if (by_row) found[Role::time] = give_clock(table, sessions, map.period_s);
   std::vector<Log> logs;
-  for (const auto& [key, rows] : sessions) {
+  for (const auto& [name, rows] : sessions) {
     Log whole = one_log(table, found, rows,
-                        sessions.size() > 1 ? fmt::format("{} (session {:g})", table.file, key) : table.file, motor);
+                        name.empty() ? table.file : fmt::format("{} (session {})", table.file, name), motor);
     if (!std::isnan(map.ambient_degC)) {
       if (whole.has(sink_of(whole)))
         whole.notes.push_back(fmt::format(
             "The log's own {} tells how warm the surroundings are; --ambient is not used.", own_name(sink_of(whole))));
       else
-        whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC);
+        whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC), whole.sink_typed = true;
     }
+    forget_impossible(whole);
     forget_filled(whole);
     forget_glitches(whole);
     check_values(whole, motor);
@@ -686,6 +822,8 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
     }
   }
   logs.front().notes.insert(logs.front().notes.begin(), unit_notes.begin(), unit_notes.end());
+  std::size_t in_a_session = 0;
+  for (const Session& s : sessions) in_a_session += s.rows.size();
   if (in_a_session < table.rows())
     logs.front().notes.push_back(fmt::format("{} rows without a session were left out.", table.rows() - in_a_session));
   return logs;

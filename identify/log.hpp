@@ -19,12 +19,16 @@
 namespace identify {
 
 /// What a column may be. Bus and board are read and checked, and nothing is made of them yet; winding_ohm becomes core
-/// where the start of a log tells its temperature, torque becomes iq where nothing else tells the heat.
+/// where the start of a log tells its temperature, phases become current, torque becomes iq where nothing else tells
+/// the heat.
 enum class Role {
   time,
   current,
   id,
   iq,
+  phase_a,
+  phase_b,
+  phase_c,
   power,
   torque,
   speed,
@@ -67,6 +71,7 @@ struct ColumnMap {
   std::map<Role, Source> columns;
   double period_s = missing;      // from row to row of logs without a clock
   double ambient_degC = missing;  // of logs without a sink
+  std::string rows;               // "motor=left": only these (rows.hpp)
   std::string note;               // what a person should know of these logs, printed in the report
 };
 
@@ -95,6 +100,7 @@ struct Log {
   double gap_share = 0;      // of the duration, what lies in gaps
   std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
   double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
+  bool sink_typed = false;        // it was said once for the whole log (--ambient)
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
   Reference core_reference = {};  // of readings of the winding
   bool torque_for_A = false;      // a torque stands in iq_A as it is, for want of the motor's constant

@@ -38,7 +38,7 @@ Examples
 
 struct Arguments {
   std::vector<std::string> logs, columns, truths;
-  std::string motor, map, hold_out, json, html, write_model, write_baseline;
+  std::string motor, map, rows, hold_out, json, html, write_model, write_baseline;
   std::optional<double> period_s, ambient_degC;
   bool explain = false;
   int draws = identify::HoldOut{}.draws;
@@ -188,6 +188,7 @@ int answer(Arguments a) {
   identify::ColumnMap said;
   for (const std::string& column : a.columns) identify::add_column(said, column);
   for (const auto& [role, source] : said.columns) map.columns[role] = source;
+  map.rows = a.rows;
   if (a.period_s) map.period_s = *a.period_s;
   if (a.ambient_degC) map.ambient_degC = *a.ambient_degC;
   if (!a.truths.empty()) return score(a, map, motor);
@@ -236,9 +237,14 @@ int main(int argc, char** argv) {
   app.add_option("--map", a.map, "TOML file that says which column is what, and the period of rows without a time")
       ->type_name("FILE");
   app.add_option("--column", a.columns,
-                 "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm (may be repeated; see below)")
+                 "role=name or role=name:unit, e.g. speed_rad_per_s=n:rpm, or core_degC=T:0.01degC where a 1 is 0.01 "
+                 "degC (may be "
+                 "repeated; see below)")
       ->allow_extra_args(false)
       ->type_name("ROLE=NAME");
+  app.add_option("--rows", a.rows,
+                 "only the rows in which a column says this, e.g. motor=left, of a log of several motors")
+      ->type_name("NAME=VALUE");
   app.add_option("--period", a.period_s, "seconds from row to row, of logs without a time column")
       ->check(CLI::Range(1e-6, 86400.0))
       ->type_name("S");
@@ -280,7 +286,9 @@ int main(int argc, char** argv) {
       identify::roles_and_units() +
       "\n\n"
       "current_A: the direct current that heats alike through two terminals. Of sinusoidal phase currents it is "
-      "sqrt(3)/2 of their amplitude, 1.22 times their rms. iq_A, id_A: amplitudes. power_W: what heats the winding; "
+      "sqrt(3)/2 of their amplitude, 1.22 times their rms. iq_A, id_A: amplitudes. phase_a_A, phase_b_A, "
+      "phase_c_A: what flows there at the moment of the row; where there is no current_A it is taken from them. "
+      "power_W: what heats the winding; "
       "taken before any current. torque_Nm: the motor's own, before any gear, where nothing else tells the heat. "
       "winding_ohm: read as core_degC if the log begins at rest at room temperature.\n\n"
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "

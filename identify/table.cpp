@@ -81,7 +81,7 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
       while (close != std::string_view::npos && line.substr(close + 1, 1) == "\"")  // two of them stand for one
         close = line.find('"', close + 2);
       if (close == std::string_view::npos) return false;
-      cells.push_back(line.substr(start + 1, close - start - 1));
+      cells.push_back(trimmed(line.substr(start + 1, close - start - 1)));
       at = std::min(line.find(separator, close), line.size());
       if (!trimmed(line.substr(close + 1, at - close - 1)).empty()) return false;
     } else {
@@ -113,18 +113,14 @@ std::size_t end_of_row(std::string_view rest, char separator) {
   return quoted ? line_end : std::string_view::npos;
 }
 
-std::string in_small(std::string_view s) {
-  std::string low(s);
-  std::transform(low.begin(), low.end(), low.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return low;
-}
-
 bool means_missing(std::string_view s) {
   if (s.empty()) return true;
-  // #NV: a German spreadsheet's #N/A.
-  constexpr std::string_view words[] = {"nan", "-nan", "na", "n/a", "#n/a", "#nv", "null", "none", "-", "--"};
-  return std::find(std::begin(words), std::end(words), in_small(s.substr(0, 5))) != std::end(words);
+  // #NV: a German spreadsheet's #N/A; \N: a database's; 1.#: an old C library's.
+  constexpr std::string_view words[] = {"nan",     "-nan",    "-nan(ind)", "na",      "n/a",    "n.a.",
+                                        "#n/a",    "#nv",     "<na>",      "nat",     "null",   "none",
+                                        "\\n",     "1.#qnan", "1.#ind",    "-1.#ind", "1.#inf", "-1.#inf",
+                                        "#div/0!", "#value!", "-",         "--",      "---",    "?"};
+  return s.size() < 10 && std::find(std::begin(words), std::end(words), in_small(s)) != std::end(words);
 }
 
 /// Digits and nothing else as a whole number.
@@ -151,38 +147,59 @@ bool time_of_day(std::string_view s, double& value) {
 
 bool number(std::string_view s, bool decimal_comma, double& value);
 
-/// The date that a cell begins with, and where its time begins: 2026-11-21 as in ISO 8601, 21.11.2026 as in Germany, or
-/// 21-Nov-2026 as in MATLAB. 11/21 and 21/11 cannot be told apart.
-bool date_of(std::string_view s, std::chrono::year_month_day& date, std::size_t& clock) {
+/// A date by itself: 2026-11-21 as in ISO 8601 or 2026/11/21, 21.11.2026 as in Germany, 21-Nov-2026 as in MATLAB, and
+/// 11/21/2026 beside a clock of twelve hours, as in America; else 11/21 and 21/11 cannot be told apart.
+bool date_of(std::string_view s, bool american, std::chrono::year_month_day& date) {
   constexpr std::string_view months = "jan feb mar apr may jun jul aug sep oct nov dec";
-  int year = 0, month = 0, day = 0;
-  if (s.size() < 19) return false;
-  const auto made_of = [&](std::size_t y, std::size_t m, std::size_t d, std::size_t length) {
-    clock = length + 1;
-    if (!digits(s.substr(y, 4), year) || !digits(s.substr(d, 2), day)) return false;
-    if (m != std::string_view::npos && !digits(s.substr(m, 2), month)) return false;
-    date = {std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-            std::chrono::day(static_cast<unsigned>(day))};
-    return date.ok() && (s[length] == ' ' || s[length] == 'T');
-  };
-  if (s[4] == '-' && s[7] == '-') return made_of(0, 5, 8, 10);
-  if (s[2] == '.' && s[5] == '.') return made_of(6, 3, 0, 10);
-  const std::size_t name = s[2] == '-' && s[6] == '-' ? months.find(in_small(s.substr(3, 3))) : std::string_view::npos;
-  month = static_cast<int>(name / 4) + 1;
-  return name != std::string_view::npos && made_of(7, std::string_view::npos, 0, 11);
+  const std::size_t first = s.find_first_of("-/.");
+  const std::size_t second = first == std::string_view::npos ? first : s.find(s[first], first + 1);
+  if (second == std::string_view::npos) return false;
+  std::string_view year = s.substr(0, first), month = s.substr(first + 1, second - first - 1),
+                   day = s.substr(second + 1);
+  const char separator = s[first];
+  const bool year_last = year.size() != 4;
+  if (year_last) {
+    std::swap(year, day);
+    if (separator == '/') std::swap(month, day);
+    if (year.size() != 4 || (separator == '/' && !american)) return false;
+  } else if (separator == '.') {
+    return false;
+  }
+  int y = 0, m = 0, d = 0;
+  if (const std::size_t name = month.size() == 3 ? months.find(in_small(month)) : std::string_view::npos;
+      name != std::string_view::npos)
+    m = static_cast<int>(name / 4) + 1;
+  else if (separator == '-' && year_last)
+    return false;
+  else if (month.size() > 2 || month.empty() || !digits(month, m))
+    return false;
+  if (day.size() > 2 || day.empty() || !digits(day, d) || !digits(year, y)) return false;
+  date = {std::chrono::year(y), std::chrono::month(static_cast<unsigned>(m)),
+          std::chrono::day(static_cast<unsigned>(d))};
+  return date.ok();
 }
 
-/// A date and time (2026-11-21T08:15:30.5+01:00), s since 1970; a time of day; or what MATLAB writes of a duration.
+/// A date and time (2026-11-21T08:15:30.5+01:00), s since 1970; a time of day; or what MATLAB and pandas write of a
+/// duration (12.5 sec, 0 days 00:00:12.5).
 bool moment(std::string_view s, double& value) {
-  int hours = 0, minutes = 0;
+  int hours = 0, minutes = 0, days = 0;
   if (time_of_day(s, value)) return true;
   if (s.ends_with(" sec")) return number(s.substr(0, s.size() - 4), false, value);
-  std::chrono::year_month_day date;
-  std::size_t begin = 0;
-  if (!date_of(s, date, begin)) return false;
-  std::string_view clock = s.substr(begin);
-  if (clock.ends_with(" UTC") || clock.ends_with(" GMT")) clock.remove_suffix(4);
+  const std::size_t begin = s.find_first_of(" T");
+  if (begin == std::string_view::npos || begin == 0) return false;
+  std::string_view clock = s.substr(begin + 1);
+  if (clock.starts_with("days ") && digits(s.substr(0, begin), days)) {
+    if (!time_of_day(clock.substr(5), value)) return false;
+    value += 86400.0 * days;
+    return true;
+  }
   double ahead_s = 0;
+  const std::string half = clock.size() < 3 ? "" : in_small(clock.substr(clock.size() - 3));
+  const bool american = half == " am" || half == " pm";
+  if (american) clock.remove_suffix(3);
+  if (clock.ends_with(" UTC") || clock.ends_with(" GMT")) clock.remove_suffix(4);
+  std::chrono::year_month_day date;
+  if (clock.empty() || !date_of(s.substr(0, begin), american, date)) return false;
   if (clock.back() == 'Z') {
     clock.remove_suffix(1);
   } else if (const std::size_t sign = clock.find_first_of("+-"); sign != std::string_view::npos) {
@@ -193,7 +210,10 @@ bool moment(std::string_view s, double& value) {
     ahead_s = (clock[sign] == '-' ? -60 : 60) * (60 * hours + minutes);
     clock = clock.substr(0, sign);
   }
-  if (!time_of_day(trimmed(clock), value)) return false;
+  std::string told(trimmed(clock));
+  if (std::count(told.begin(), told.end(), ':') == 1) told += ":00";  // beside a date it is no stopwatch
+  if (!time_of_day(told, value)) return false;
+  if (american) value += 3600 * ((half == " pm" ? 12 : 0) - (value >= 12 * 3600 ? 12 : 0));
   value += 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) - ahead_s;
   return true;
 }
@@ -214,7 +234,7 @@ bool number(std::string_view s, bool decimal_comma, double& value) {
     std::replace(changed.begin(), changed.end(), ',', '.');
     s = changed;
   }
-  if (s.front() == '+') s.remove_prefix(1);
+  if (s.front() == '+') s = trimmed(s.substr(1));
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
   if (error == std::errc::result_out_of_range) return value = missing, end == s.data() + s.size();
   if (error != std::errc() || end != s.data() + s.size()) return moment(s, value) || (value = missing, false);
@@ -279,13 +299,39 @@ bool is_json(std::string_view text) {
          std::string_view("[{\"-0123456789").find(begin[next]) != std::string_view::npos;
 }
 
-/// Has one of the next lines the columns of a log?
-bool widens(std::string_view rest) {
-  for (int line = 0; line < 50 && !rest.empty(); ++line) {
+/// Do rows follow that belong to this one? Of the next five half have as many cells, half of them numbers: below a
+/// header units may be named first.
+bool heads_a_table(std::vector<std::string_view> cells, char separator, std::string_view rest) {
+  while (!cells.empty() && cells.back().empty()) cells.pop_back();
+  const std::size_t columns = cells.size();
+  if (columns < least_columns) return false;
+  int rows = 0, fit = 0;
+  while (rows < 5 && !rest.empty()) {
     const std::string_view row = rest.substr(0, rest.find('\n'));
-    if (std::count(row.begin(), row.end(), separator_of(rest)) + 1 >= static_cast<std::ptrdiff_t>(least_columns))
-      return true;
     rest.remove_prefix(std::min(row.size() + 1, rest.size()));
+    if (trimmed(row).empty() || trimmed(row).front() == '#') continue;
+    ++rows;
+    if (!split(row, separator, cells)) continue;
+    const auto is_number = [&](std::string_view cell) {
+      double value = missing;
+      return number(cell, separator != ',', value) && !std::isnan(value);
+    };
+    const auto numbers = std::count_if(cells.begin(), cells.end(), is_number),
+               told = std::count_if(cells.begin(), cells.end(), [](auto cell) { return !means_missing(cell); });
+    while (cells.size() > columns && cells.back().empty()) cells.pop_back();
+    fit += numbers > 0 && 2 * numbers >= told && cells.size() == columns;
+  }
+  return fit > 0 && 2 * fit >= rows;
+}
+
+/// Does a table begin below, after what some loggers write first?
+bool begins_below(std::string_view rest) {
+  std::vector<std::string_view> cells;
+  for (int line = 0; line < 100 && !rest.empty(); ++line) {
+    const char separator = separator_of(rest);
+    const std::string_view row = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(row.size() + 1, rest.size()));
+    if (split(row, separator, cells) && heads_a_table(cells, separator, rest)) return true;
   }
   return false;
 }
@@ -322,24 +368,47 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
   }
   while (header.size() > 1 && header.back().empty()) header.pop_back();
   for (const auto name : header) table.names.push_back(one_line(trimmed(name)));
+  for (std::size_t c = 0; c < header.size(); ++c) {
+    if (table.names[c].empty()) table.names[c] = fmt::format("#{}", c + 1);  // pandas leaves that of its index empty
+  }
   table.columns.resize(header.size());
+  table.words.resize(header.size());
   table.complaints.resize(header.size());
   table.of_day.resize(header.size());
   return !numbers;
 }
 
+/// Notes a cell's word; of the thousands that free text has, none beyond the first hundred.
+void take(Words& words, std::string_view cell, std::size_t row) {
+  constexpr std::size_t most = 100;
+  auto at = std::find(words.seen.begin(), words.seen.end(), cell);
+  if (at == words.seen.end() && words.seen.size() < most) at = words.seen.emplace(at, cell);
+  words.of_row.resize(row);
+  words.of_row.push_back(static_cast<std::size_t>(at - words.seen.begin()) + 1);
+}
+
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     double value = missing, unused = 0;
-    if (!number(cells[c], decimal_comma, value) && table.complaints[c].empty()) {
-      table.complaints[c] =
-          at_line(table, line,
-                  fmt::format("'{}' in column '{}' is not a number{}; repair it or leave the cell empty.",
-                              shown(cells[c]), shown(table.names[c]),
-                              like_a_moment(cells[c])
-                                  ? ", nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
-                                    "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30)"
-                                  : ""));
+    if (!number(cells[c], decimal_comma, value)) {
+      Words& words = table.words[c];
+      const bool like_number = cells[c].find_first_of("0123456789") != std::string_view::npos;
+      take(words, cells[c], table.rows());
+      if (!table.complaints[c].empty() && (words.like_numbers || !like_number)) {
+        table.columns[c].push_back(missing);
+        continue;
+      }
+      words.like_numbers = like_number;
+      table.complaints[c] = at_line(
+          table, line,
+          fmt::format(
+              "'{}' in column '{}' is not a number{}; repair it or leave the cell empty.", shown(cells[c]),
+              shown(table.names[c]),
+              like_a_moment(cells[c])
+                  ? ", nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
+                    "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
+                    "--period S does without)"
+                  : ""));
     }
     table.columns[c].push_back(value);
     if (time_of_day(cells[c], unused)) table.of_day[c] = true;
@@ -354,6 +423,13 @@ std::string_view trimmed(std::string_view s) {
   while (!s.empty() && blank(s.front())) s.remove_prefix(1);
   while (!s.empty() && blank(s.back())) s.remove_suffix(1);
   return s;
+}
+
+std::string in_small(std::string_view s) {
+  std::string low(s);
+  std::transform(low.begin(), low.end(), low.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  return low;
 }
 
 std::size_t count_told(const std::vector<double>& cells) {
@@ -399,6 +475,15 @@ double row_period_s(const std::vector<double>& time_s) {
   return period_s;
 }
 
+std::size_t Words::count() const {
+  return of_row.size() - static_cast<std::size_t>(std::count(of_row.begin(), of_row.end(), 0u));
+}
+
+std::string Words::in_row(std::size_t row) const {
+  const std::size_t place = row < of_row.size() ? of_row[row] : 0;
+  return place == 0 || place > seen.size() ? "" : seen[place - 1];
+}
+
 int Table::find(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   return at == names.end() ? -1 : static_cast<int>(at - names.begin());
@@ -422,7 +507,8 @@ Table read_table(const std::string& path) {
   char separator = ',';
   std::vector<std::string_view> cells;
   std::string_view remark;  // the last '#' line: some programs write the header there
-  int lines = skip_preamble(rest);
+  int lines = skip_preamble(rest), torn = 0, first_torn = 0, headers = 0;
+  std::string what_is_torn;
   for (int line = 1 + lines; !rest.empty(); line += lines) {
     if (table.names.empty()) separator = separator_of(rest);
     const std::size_t end = end_of_row(rest, separator);
@@ -446,19 +532,25 @@ Table read_table(const std::string& path) {
     if (table.names.empty()) {
       if (bare.find_first_not_of(",;\t\" ") == std::string_view::npos) continue;
       if (!split(row, separator, cells)) refuse(table, line, "a quote is opened and never closed; repair the header.");
-      if (cells.size() < least_columns && widens(rest)) continue;  // what some loggers write before the table
+      if (!heads_a_table(cells, separator, rest) && begins_below(rest)) continue;
       if (name_columns(table, cells, remark, separator, line)) continue;
     }
     // A separator at the end of every row is some loggers' habit; one cell too many and empty is not a mistake.
     const bool whole = split(row, separator, cells);
     if (whole && cells.size() == table.names.size() + 1 && cells.back().empty()) cells.pop_back();
     if (!whole || cells.size() != table.names.size()) {
-      refuse(table, line,
-             fmt::format(
-                 "the row has {} of {} cells{}{}", cells.size(), table.names.size(),
-                 lines > 1 ? fmt::format(", one of them in quotes until line {}", line + lines - 1) : "",
-                 closed ? "; repair or delete this line."
-                        : " and the file ends in it, so it was cut off; delete the last line or copy the file again."));
+      const std::string wrong = fmt::format(
+          "the row has {} of {} cells{}{}", cells.size(), table.names.size(),
+          lines > 1 ? fmt::format(", one of them in quotes until line {}", line + lines - 1) : "",
+          closed ? "; repair or delete this line."
+                 : " and the file ends in it, so it was cut off; delete the last line or copy the file again.");
+      if (!whole || !closed || lines > 1) refuse(table, line, wrong);
+      if (torn++ == 0) first_torn = line, what_is_torn = wrong;
+      continue;
+    }
+    if (std::equal(cells.begin(), cells.end(), table.names.begin())) {
+      ++headers;
+      continue;
     }
     if (table.line.empty() && table.units.empty() && all_words(cells, separator != ','))
       table.units.assign(cells.begin(), cells.end());
@@ -468,6 +560,12 @@ Table read_table(const std::string& path) {
   if (table.names.empty()) {
     throw UserError(Exit::unusable, path + ": the file is empty; record a log with a header line and rows.");
   }
+  constexpr double most_torn = 0.01;  // of the rows: more are another table
+  if (torn > 0 && torn > most_torn * static_cast<double>(table.rows())) refuse(table, first_torn, what_is_torn);
+  if (torn > 0)
+    table.notes.push_back(fmt::format(
+        "Lines that have not as many cells as the header were left out: {}, the first line {}.", torn, first_torn));
+  if (headers > 0) table.notes.push_back(fmt::format("Lines that repeat the header were left out: {}.", headers));
   if (table.rows() == 0)
     throw UserError(Exit::unusable, path + ": there is a header and no row; the recording failed: record it again.");
   return table;

@@ -21,6 +21,7 @@ inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 /// Without blanks, tabs and carriage returns at its ends.
 std::string_view trimmed(std::string_view s);
+std::string in_small(std::string_view s);  // of the letters A to Z
 
 /// How many cells are not missing; and the largest of these without its sign, 0 of none.
 std::size_t count_told(const std::vector<double>& cells);
@@ -34,14 +35,25 @@ std::vector<double> spacing(const std::vector<double>& cells);
 /// than two.
 double row_period_s(const std::vector<double>& time_s);
 
+/// The cells of a column that are neither numbers nor a word for "missing".
+struct Words {
+  std::vector<std::string> seen;    // each once
+  std::vector<std::size_t> of_row;  // its place in `seen` and one; 0 and the rows after the last: none
+  bool like_numbers = false;        // one of them has a digit
+  std::size_t count() const;
+  std::string in_row(std::size_t row) const;  // empty: none
+};
+
 struct Table {
   std::string file;
   std::vector<std::string> names;
   std::vector<std::string> units;            // as a row below the header gives them; empty without such a row
   std::vector<std::vector<double>> columns;  // columns[c][row]
+  std::vector<Words> words;                  // for each column
   std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
   std::vector<bool> of_day;                  // for each column: a cell of it is a time of day, without a date
   std::vector<int> line;                     // line number of each row, for sentences
+  std::vector<std::string> notes;            // what was passed over, a sentence each
 
   std::size_t rows() const { return line.size(); }
   int find(const std::string& name) const;  // -1: no such column

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <map>
 #include <numbers>
 
@@ -81,6 +83,15 @@ std::string quantity_of_role(const std::string& role) {
   return quantity;
 }
 
+std::optional<Unit> multiple_of_unit(const std::string& text) {
+  double many = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), many);
+  if (error != std::errc() || !(many > 0) || !std::isfinite(many)) return std::nullopt;
+  auto unit = unit_named(end);
+  if (unit) unit->factor *= many, unit->offset /= many;
+  return unit;
+}
+
 }  // namespace
 
 std::optional<Unit> unit_named(const std::string& unit) {
@@ -91,7 +102,7 @@ std::optional<Unit> unit_named(const std::string& unit) {
       if (c != ' ') plain += c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
     }
     const auto spelling = spellings().find(plain);
-    if (spelling == spellings().end()) return std::nullopt;
+    if (spelling == spellings().end()) return multiple_of_unit(unit);
     at = units().find(spelling->second);
   }
   return at->second;

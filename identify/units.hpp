@@ -15,6 +15,7 @@ struct Unit {
   double factor, offset;  // SI = factor * (value + offset)
 };
 
+/// Also of so many of a unit, 0.01degC.
 std::optional<Unit> unit_named(const std::string& unit);
 std::vector<std::string> unit_names();
 

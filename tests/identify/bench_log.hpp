@@ -24,6 +24,7 @@ struct BenchMotor {
 struct BenchOptions {
   BenchMotor motor;
   double seconds = 900, rate_Hz = 10, ambient_degC = 24, start_degC = 24;
+  double room_K = 0, room_period_s = 1800;            // by how much and how fast the ambient swings
   double white_K = 0.2, slow_K = 0.05, step_K = 0.1;  // housing sensor
   double sensor_share = 0;                            // of the way from housing to winding, where that sensor sits
   double core_every_s = 0, core_white_K = 0.2;        // 0: no winding reading
@@ -56,6 +57,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
   long next_core = 0;
   for (long row = 0; row < rows; ++row) {
     const double t = static_cast<double>(row) / o.rate_Hz;
+    const double room_degC = o.ambient_degC + o.room_K * std::sin(2 * 3.14159265 * t / o.room_period_s);
     if (o.current_A)
       current = o.current_A(t, random);
     else if (t >= until) {
@@ -74,7 +76,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
       return k == 2 ? 0 : heat25 / 2 * (1 + m.copper * (at[k] - 25));
     };
     out << t << ',' << (o.power_gain > 0 ? (phase_W(T, 0) + phase_W(T, 1)) * o.power_gain : current) << ",0," << housing
-        << ',' << o.ambient_degC;
+        << ',' << room_degC;
     if (o.core_every_s > 0) {
       out << ',';
       if (row >= next_core) {
@@ -95,7 +97,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
           d[k] = (phase_W(at, k) - out_W - across_W) / (m.C1 / 3);
           d[3] += out_W;
         }
-        d[3] += (o.ambient_degC - at[3]) / m.R2 + (o.extra_housing_W ? o.extra_housing_W(t, current, at[3]) : 0);
+        d[3] += (room_degC - at[3]) / m.R2 + (o.extra_housing_W ? o.extra_housing_W(t, current, at[3]) : 0);
         d[3] /= m.C2;
         return d;
       };

@@ -325,12 +325,13 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
 TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
   const std::string forms =
       " is not a number, nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
-      "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30); repair it";
+      "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
+      "--period S does without); repair it";
   for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "12/31/2025 10:00:00",
                            "10:00:00 AM", "8:15 PM", "2025-06-01", "Dec 31 10:00:00 2025"})
     says(complaint(head + date + ",1,20\n"), forms);
   for (const char* time : {"12.5", "08:15:30", "1:05.3", "2026-11-21 08:15:30", "2026-11-21T08:15:30.5+01:00",
-                           "21.11.2026 08:15:30", "21-Nov-2026 08:15:30"})
+                           "21.11.2026 08:15:30", "21-Nov-2026 08:15:30", "11/21/2026 08:15:30 AM"})
     EXPECT_EQ(read(head + time + ",1,20\n")[0].of(Role::time).size(), 1u) << time;
   says(complaint(head + "1.5x,1,20\n"), "'1.5x' in column 'time_s' is not a number; repair it");
 }
@@ -445,6 +446,182 @@ TEST(Reader, UnitsOfMappedColumnsBecomeSi) {
   EXPECT_NEAR(log.of(Role::housing)[0], 20, 1e-9);
   EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
   EXPECT_DOUBLE_EQ(log.of(Role::current)[1], 2);
+}
+
+/// Rows of two motors in turn, one of them warmer.
+std::string two_motors(const std::string& column, const char* one, const char* other) {
+  std::string text = "time_s,current_A,housing_degC," + column + "\n";
+  for (int i = 0; i < 40; ++i)
+    text +=
+        fmt::format("{},{},{},{}\n", i / 2, i % 2 ? 3 : 1, i % 2 ? 50 + 0.1 * i : 20 + 0.1 * i, i % 2 ? one : other);
+  return text;
+}
+
+TEST(Rows, OfSeveralMotorsAreRefusedAndThoseOfOneAreRead) {
+  const std::string text = two_motors("motor", "left", "right");
+  says(complaint(text),
+       "its rows belong to several motors in turn, as column 'motor' tells (left, right); choose one "
+       "with --rows \"motor=left\".");
+  says(complaint(two_motors("nr", "1", "2")), "as column 'nr' tells (1, 2)");  // whose temperatures are far apart
+  ColumnMap map;
+  map.rows = "motor=left";
+  const Log log = read(text, map)[0];
+  ASSERT_EQ(log.of(Role::time).size(), 20u);
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[5], 3);
+  EXPECT_DOUBLE_EQ(log.of(Role::housing)[5], 51.1);
+  map.rows = "nr=2";
+  EXPECT_DOUBLE_EQ(read(two_motors("nr", "1", "2"), map)[0].of(Role::current)[5], 1);
+  map.rows = "motor=both";
+  says(complaint(text, map, 2), "--rows motor=both: no row says so; its column says: right, left.");
+  map.rows = "moter=left";
+  says(complaint(text, map, 2), "has no column 'moter', did you mean 'motor'?");
+  map.rows = "left";
+  says(complaint(text, map, 2), "write it as COLUMN=VALUE");
+  ColumnMap sessions;
+  add_column(sessions, "session=motor");
+  says(complaint(text, sessions), "its rows belong to several motors in turn");
+}
+
+TEST(Rows, ACounterOfMessagesOrABitThatTogglesIsNoMotor) {
+  std::string toggles = "time_s,current_A,housing_degC,alive\n", kinds = "time_s,current_A,housing_degC,id\n";
+  for (int i = 0; i < 40; ++i) {
+    toggles += fmt::format("{},1,{},{}\n", i, 20 + 0.1 * i, i % 2);
+    kinds += i % 2 ? fmt::format("{},1,,7\n", i) : fmt::format("{},,{},8\n", i, 20 + 0.1 * i);
+  }
+  EXPECT_EQ(read(toggles)[0].of(Role::time).size(), 40u);
+  EXPECT_EQ(read(kinds)[0].of(Role::time).size(), 40u);
+}
+
+TEST(Rows, SessionsMayBeWords) {
+  const auto logs =
+      read("time_s,current_A,housing_degC,session\n0,1,20,run_B\n1,1,21,run_B\n0,2,20,run_A\n1,2,22,run_A\n");
+  ASSERT_EQ(logs.size(), 2u);
+  says(logs[0].name, "(session run_A)");
+  EXPECT_DOUBLE_EQ(logs[0].of(Role::current)[0], 2);
+}
+
+/// Rows a second apart, the housing warmer by a tenth each; what `cell` says for those it has a word for.
+std::string rows_with(const std::function<std::string(int)>& cell, int rows = 200) {
+  std::string text = head;
+  for (int i = 0; i < rows; ++i) {
+    const std::string said = cell(i);
+    text += said.find(',') != std::string::npos || said.find(';') != std::string::npos
+                ? said + "\n"
+                : fmt::format("{},1,{}\n", i, said.empty() ? fmt::format("{:.1f}", 20 + 0.1 * i) : said);
+  }
+  return text;
+}
+
+TEST(Reader, AFewWordsAmongNumbersAreReadingsThatFailed) {
+  const Log log = read(rows_with([](int i) { return i % 50 == 7 ? "OL" : ""; }))[0];
+  EXPECT_TRUE(std::isnan(log.of(Role::housing)[7]));
+  EXPECT_DOUBLE_EQ(log.of(Role::housing)[8], 20.8);
+  says(fmt::format("{}", fmt::join(log.notes, " ")),
+       "Cells of column 'housing_degC' with a word in them ('OL') count as not read: 4.");
+  says(complaint(rows_with([](int i) { return i % 10 == 7 ? "OL" : ""; })), "line 9: 'OL' in column 'housing_degC'");
+  says(complaint(rows_with([](int i) { return i == 7 ? "OL" : i == 9 ? "2O.9" : ""; })), "line 11: '2O.9'");
+  for (const char* none : {"---", "#VALUE!", "#DIV/0!", "1.#QNAN", "<NA>", "NaT", "\\N", "n.a.", "?"})
+    EXPECT_EQ(identify::count_told(read(rows_with([&](int i) { return i % 3 ? none : ""; }))[0].of(Role::housing)),
+              67u);
+}
+
+TEST(Reader, AFewTornLinesAndRepeatedHeadersAreLeftOut) {
+  const Log log = read(rows_with(
+      [](int i) {
+        return i == 50 ? "50,1" : i == 60 ? "60,1,26.0,61,1" : i == 70 ? "time_s,current_A,housing_degC" : "";
+      },
+      300))[0];
+  EXPECT_EQ(log.of(Role::time).size(), 297u);
+  const std::string notes = fmt::format("{}", fmt::join(log.notes, " "));
+  says(notes, "Lines that have not as many cells as the header were left out: 2, the first line 52.");
+  says(notes, "Lines that repeat the header were left out: 1.");
+  says(complaint(rows_with([](int i) { return i % 50 == 7 ? "50,1" : ""; })),
+       "line 9: the row has 2 of 3 cells; repair");
+}
+
+TEST(Reader, WhatALoggerWritesAboveItsTableMayBeATableToo) {
+  const std::string rows = "0,1,20.0\n1,1,20.1\n2,1,20.2\n3,1,20.3\n";
+  for (const char* above : {"Vendor,G Corporation,\nModel,GL240,\nAMP "
+                            "settings,,\nCH,Signal,Input,Range\nCH1,i,TEMP,20\nCH2,i,TEMP,30\nCH3,T,TEMP,40\n",
+                            "CH,U1-1,U1-2\nMode,Tc,Tc\nRange,auto,auto\nComment,,\n"})
+    EXPECT_EQ(read(above + head + "s,A,degC\n" + rows)[0].of(Role::time).size(), 4u) << above;
+}
+
+TEST(Reader, DatesAreReadInEachFormThatCannotBeAnother) {
+  const double first_s = read(head + "2026-11-21T08:15:30,1,20\n2026-11-21T08:16:00,1,21\n")[0].of(Role::time)[1];
+  EXPECT_DOUBLE_EQ(first_s, 30);
+  const char* pairs[][2] = {
+      {"2026/11/21 08:15:30", "2026/11/22 08:15:30"},     {"21.11.2026 08:15:30", "22.11.2026 08:15:30"},
+      {"21-Nov-2026 08:15:30", "22-Nov-2026 08:15:30"},   {"11/21/2026 8:15:30 AM", "11/22/2026 08:15:30 AM"},
+      {"11/20/2026 8:15:30 PM", "11/21/2026 8:15:30 PM"}, {"11/20/2026 12:15:30 AM", "11/21/2026 12:15:30 AM"},
+      {"2026-11-21 08:15", "2026-11-22 08:15"},           {"0 days 00:00:01", "1 days 00:00:01"}};
+  for (const auto& [one, other] : pairs)
+    EXPECT_DOUBLE_EQ(read(head + one + ",1,20\n" + other + ",1,21\n")[0].of(Role::time)[1], 86400) << one;
+  EXPECT_DOUBLE_EQ(read(head + "11/20/2026 11:59:30 AM,1,20\n11/20/2026 12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
+  for (const char* either :
+       {"11/20/2026 08:15:30", "21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
+    says(complaint(head + either + ",1,20\n"), "nor a time as it is read");
+}
+
+TEST(Reader, PhasesTellWhatHeatsAlike) {
+  std::string three = "time_s,phase_a_A,phase_b_A,phase_c_A,housing_degC\n",
+              two = "time_s,phase_a_A,phase_c_A,housing_degC\n";
+  for (int i = 0; i < 50; ++i) {
+    const auto phase_A = [&](int k) { return 4 * std::cos(0.7 * i - 2.0943951 * k); };
+    three += fmt::format("{},{},{},{},{}\n", i, phase_A(0), phase_A(1), phase_A(2), 20 + i);
+    two += fmt::format("{},{},{},{}\n", i, phase_A(0), phase_A(2), 20 + i);
+  }
+  for (const std::string& text : {three, two}) {
+    const Log log = read(text)[0];
+    for (const double A : log.of(Role::current)) EXPECT_NEAR(A, 4 * std::sqrt(0.75), 1e-4);
+  }
+  says(complaint("time_s,phase_a_A,housing_degC\n0,1,20\n1,-1,21\n"), "alternates and does not tell how much flows");
+  says(complaint("time_s,phase_a_A,phase_b_A,housing_degC\n0,1,1,20\n1,1,1,21\n"), "map all three phases");
+  ColumnMap map;
+  add_column(map, "current_A=I_u [A]");
+  says(complaint("time_s,I_u [A],housing_degC\n0,1,20\n1,-1,21\n", map), "column 'I_u [A]' is called like one phase");
+  EXPECT_EQ(read("time_s,I_u [A],housing_degC\n0,1,20\n1,1.1,21\n", map).size(), 1u) << "an effective value";
+}
+
+TEST(Reader, AColumnMayBeInPartsOfAUnit) {
+  ColumnMap map;
+  add_column(map, "current_A=I:1.5A");
+  add_column(map, "housing_degC=T:0.01degC");
+  add_column(map, "ambient_degC=F:0.1degF");
+  const Log log = read("time_s,I,T,F\n0,2,2150,680\n1,4,2250,689\n", map)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[0], 3);
+  EXPECT_DOUBLE_EQ(log.of(Role::housing)[1], 22.5);
+  EXPECT_NEAR(log.of(Role::ambient)[0], 20, 1e-9);
+  EXPECT_NEAR(log.of(Role::ambient)[1], 20.5, 1e-9);
+  says(complaint(head + "0,1,2150\n1,1,2250\n"),
+       "looks like parts of a degree; say --column housing_degC=COLUMN:0.01degC");
+}
+
+TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
+  const std::string sentence = complaint("Time [s],Current [A],T_winding [C]\n0,1,20\n1,1,21\n");
+  says(sentence, "a time column and the heat input (current_A, iq_A, power_W or torque_Nm) and a measured temperature");
+  says(sentence, "--column time_s=\"Time [s]\"");
+  says(sentence, "--column current_A=\"Current [A]\"");
+  says(sentence, "--column housing_degC=\"T_winding [C]\"");
+}
+
+TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
+  std::string text = "time_s,current_A,speed_rad_per_s,housing_degC\n";
+  for (int i = 0; i < 50; ++i) text += fmt::format("{},{},{},{}\n", i, 0.05 * i - 1, 1.5 - 0.02 * i, 0.04 * i - 1.2);
+  says(complaint(text), "as if they were normalised");
+}
+
+TEST(Reader, ATemperatureBelowZeroKelvinIsASensorThatDidNotAnswer) {
+  const Log log = read(rows_with([](int i) { return i < 5 ? "-32768" : ""; }))[0];
+  EXPECT_EQ(identify::count_told(log.of(Role::housing)), 195u);
+  says(fmt::format("{}", fmt::join(log.notes, " ")), "housing_degC is below 0 K in 5 rows, which count as not read.");
+  says(complaint(rows_with([](int i) { return i < 50 ? "-32768" : ""; })), "-80 to 600 degC is possible");
+}
+
+TEST(Reader, TheIndexThatPandasWritesHasAName) {
+  ColumnMap map;
+  add_column(map, "time_s=#1");
+  EXPECT_DOUBLE_EQ(read(",current_A,housing_degC\n0,1,20\n1,2,21\n", map)[0].of(Role::time)[1], 1);
 }
 
 TEST(Reader, AColumnMappedToOneRoleIsNotReadAsAnotherByItsOwnName) {

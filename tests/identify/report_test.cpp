@@ -27,8 +27,8 @@
 
 namespace {
 
-using nlohmann::json;
 using identify::Verdict;
+using nlohmann::json;
 using tests::says;
 
 identify::Report report_of(const tests::BenchOptions& options, const identify::HoldOut& held = {}) {
@@ -297,6 +297,32 @@ TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
   ASSERT_NE(report.verdict, Verdict::adequate);
   says(report.sentence, "No ambient was recorded: a room that is not as warm as what the log begins at");
   EXPECT_EQ(report.model_toml.find("gain = -"), std::string::npos) << "heat out of the housing, for a board";
+}
+
+TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
+  int seen = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    tests::BenchOptions options;
+    options.seconds = 2400;
+    options.room_K = 0.4;
+    options.core_every_s = 10;
+    options.current_A = [](double t, std::mt19937_64&) {  // never at rest, where the room's swing would count as noise
+      return 1 + 2.5 * std::fmod(std::floor(t / 45) * 0.618, 1.0);
+    };
+    options.white_K = 0.05;
+    options.step_K = 0.01;
+    options.slow_K = 0.02;
+    options.seed = seed;
+    auto logs = tests::bench_logs({options});
+    EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate) << seed;
+    logs[0].of(identify::Role::ambient).clear();
+    EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate) << seed << ", room not told";
+    logs[0].of(identify::Role::ambient).assign(logs[0].of(identify::Role::time).size(), 24);
+    seen += identify::discover(logs, tests::ec_16()).verdict != Verdict::adequate;
+    logs[0].sink_typed = true;
+    EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate) << seed << ", room typed";
+  }
+  EXPECT_GE(seen, 2) << "of four that are told a still room: what this test is about";
 }
 
 TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
