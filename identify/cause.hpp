@@ -23,6 +23,7 @@ enum class Edit {
   power_of_log,    // parameter 0: factor of the recorded power that heats, likewise
   current_offset,
   sensor_lag,
+  winding_lag,
   sensor_offset,
   sensor_gain,
   sensor_share,  // parameter 0: how far towards the winding the housing sensor sits
@@ -56,7 +57,7 @@ struct Parameter {
   double none = 0;  // where the prior is centred: what does nothing, or, of what always does something, the usual
 };
 
-enum class Needs { nothing, current, speed, neighbour, frame, several_currents, several_logs, several_powers, copper };
+enum class Needs { nothing, current, speed, neighbour, frame, several_currents, several_logs, several_powers, copper, winding };
 
 struct Cause {
   const char* id;
@@ -167,6 +168,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
       break;
     case Edit::sensor_lag:
       set.housing.lag_s = k[0] + least_lag_s;
+      break;
+    case Edit::winding_lag:
+      model.winding_lag_s = k[0] + least_lag_s;
+      model.winding_lags = true;
       break;
     case Edit::sensor_offset:
       set.housing.offset_K = k[0];

@@ -322,6 +322,24 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
   return out;
 }
 
+/// Of all that is stated or may be given to a board.
+void widen_along_ridges(const Problem& problem, Search& found) {
+  const auto widen = [&](Fit& f) {
+    if (!f.valid()) return;
+    Problem unsure = problem;
+    unsure.leeway = ordinary_leeway(problem, f);
+    for (Leeway& more : leeway_of_an_unseen_winding(problem, f)) unsure.leeway.push_back(std::move(more));
+    f = as_wide_as_its_ridge(unsure, std::move(f));
+  };
+  widen(found.base.fit);
+  widen(found.chosen.fit);
+  for (std::vector<Candidate>* some : {&found.singles, &found.sets}) {
+    for (Candidate& c : *some) {
+      if (c.likely) widen(c.fit);
+    }
+  }
+}
+
 /// The answer with each row's current taken for what flowed before it, where that is why the load is ahead. Half a row
 /// is averaged over (leeway.cpp). About one is a row's, and so is more where nothing remains of it then.
 std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log>& given,
@@ -433,6 +451,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
+  if (!problem.any_core() && !problem.belief.known) widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no

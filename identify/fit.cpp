@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "identify/replay.hpp"
 #include "identify/whitening.hpp"
@@ -395,6 +396,8 @@ std::vector<std::vector<double>> starts_of(const Cause& cause, const std::vector
       return out;
     case Edit::sensor_lag:  // s
       return {{3}, {30}, {75}};
+    case Edit::winding_lag:  // s
+      return {{0.5}, {5}, {15}};
     case Edit::delay:  // s
       return {{2}, {20}, {-10}};
     case Edit::sensor_share:
@@ -561,6 +564,37 @@ Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initiali
   x.head(base_count) << x[1] + std::log(R1_of_R2.middle), x[1], x[3] + std::log(C1_of_C2.middle), x[3];
   Fit usual = lowest_valley(problem, chosen, c, x, most, descend_from);
   return usual.cost < best.cost ? usual : best;
+}
+
+Fit as_wide_as_its_ridge(const Problem& problem, Fit f) {
+  constexpr double far = std::numbers::ln2, least = 0.1;  // of a cost: less is no difference
+  const auto c = layout(problem, f.chosen);
+  const Averaged averaged(problem);
+  const Fit here = descend(problem, averaged, f.chosen, c, f.x, 20);
+  if (!here.valid()) return f;
+  const double noise2 = std::max(1.0, here.ratio() * here.ratio());
+  f.information = here.information;
+  f.from_data = here.from_data;
+  double variance = f.covariance()(0, 0) * noise2;
+  Eigen::VectorXd along;
+  for (const double step : {-far, far}) {
+    auto held = c;
+    held[0].low = held[0].high = here.x[0] + step;
+    Eigen::VectorXd x = here.x;
+    x[0] += step;
+    x[2] -= step;  // R1 C1 is known
+    const Fit there = descend(problem, averaged, f.chosen, held, x, 40);
+    if (!there.valid()) continue;
+    const double dearer = std::max(there.cost - here.cost, least) / noise2;
+    if (far * far / (2 * dearer) > variance) variance = far * far / (2 * dearer), along = (there.x - here.x) / step;
+  }
+  if (along.size() == 0) return f;
+  const double more = variance / noise2 - f.covariance()(0, 0);
+  for (Eigen::MatrixXd* known : {&f.information, &f.from_data}) {  // Sherman and Morrison: the inverse of a sum
+    const Eigen::VectorXd of_it = *known * along;
+    *known -= more / (1 + more * along.dot(of_it)) * of_it * of_it.transpose();
+  }
+  return f;
 }
 
 int coordinate_of(const Fit& fit, Edit edit) {

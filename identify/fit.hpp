@@ -47,6 +47,11 @@ struct Fit {
 Fit fit(const Problem& problem, const std::vector<Chosen>& chosen, std::initializer_list<const Fit*> warm = {},
         int most = 60);
 
+/// The same fit, as unsure as it is in `problem` (which may average over more), and of R1 as unsure as a factor of two
+/// away from it, either way: seen from the housing alone R1, C1 and C2 lie along a ridge that bends, and the curvature
+/// at its top may say far more than there is to know.
+Fit as_wide_as_its_ridge(const Problem& problem, Fit fit);
+
 /// First coordinate of a chosen cause that edits this; -1: none does.
 int coordinate_of(const Fit& fit, Edit edit);
 

@@ -35,6 +35,11 @@ constexpr double ordinary_load_share = 0.002;
 constexpr double ordinary_room_K = 0.3;
 constexpr int room_waves = 4;
 
+/// Of the rise, as still air cools: between none and all of a motor's cooling may go so, evenly likely, the root of
+/// whose mean square this is. And a thermistor of one percent in a divider of one percent, over the range of a motor.
+const double ordinary_convection_exponent = 0.25 / std::sqrt(3.0);
+constexpr double ordinary_sensor_gain = 0.03;
+
 /// How well a winding that its resistance tells is known where its reference was taken. The middle half of normal
 /// readings tells their mean to 1.1 times what all of them do. The housing is read as often or more, but what it
 /// wanders by, or where between its steps it stood, is the same for the whole of a rest.
@@ -98,7 +103,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
-    return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay;
+    return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay || e == Edit::winding_lag;
   });
   const Fit& prompt = sensor ? two_resistors : motor;
   const Fit late = with_cause(prompt, "sensor_lag", {lag_s}), delayed = with_cause(prompt, "clock_delay", {delay_s});
@@ -153,6 +158,22 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
       std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.sink_unwatched; });
   for (int halves = 0; unwatched && halves <= room_waves; ++halves)
     out.push_back(leeway_of_rooms(problem, motor, halves));
+  return out;
+}
+
+std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fit& fit) {
+  const Fit motor = bare(fit);
+  std::vector<Leeway> out;
+  for (const auto& [id, size] : {std::pair{"natural_convection", ordinary_convection_exponent},
+                                 std::pair{"sensor_gain", ordinary_sensor_gain}}) {
+    const Fit other = with_cause(motor, id, {size});
+    Leeway& leeway = out.emplace_back();
+    for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+      const Replayed plain = replayed(problem, motor, l), moved = replayed(problem, other, l);
+      leeway.housing_K.push_back(apart_K(moved.housing_degC, plain.housing_degC));
+      leeway.core_K.push_back(apart_K(moved.core_degC, plain.core_degC));
+    }
+  }
   return out;
 }
 

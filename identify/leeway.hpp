@@ -20,6 +20,10 @@ inline constexpr const char* leeway_words =
 /// resistors alone is no motor.
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor);
 
+/// What is mistaken for a nearer or farther winding where neither a sheet nor a reading tells of it, for the housing
+/// tells R1 by how copper's resistance grows alone: cooling that grows as well, and a sensor's gain.
+std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fit& fit);
+
 /// Heat that goes otherwise with load than the recorded current's square says, as current sensors and sampling have it.
 /// A housing known to hundredths of a kelvin would take it for copper that warms otherwise, and so for another R1.
 Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors);

@@ -291,6 +291,34 @@ std::vector<std::size_t> temperature_glitches(const Log& log, Role role) {
   return glitches;
 }
 
+/// Rows between two steps, away and back, in which a sensor had come off, or its wire: no housing and no room makes one
+/// such step, and a winding does.
+std::vector<std::size_t> readings_of_a_loose_sensor(const Log& log, Role role) {
+  constexpr double step_K = 20, at_once_s = 3, longest_s = 300, back_share = 0.25;
+  if (role == Role::core) return {};
+  const auto &v = log.of(role), &t = log.of(Role::time);
+  std::vector<std::size_t> read, loose;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (!std::isnan(v[i])) read.push_back(i);
+  }
+  const auto step = [&](std::size_t k) {
+    const std::size_t i = read[k], before = read[k - 1];
+    return t[i] - t[before] <= at_once_s && std::abs(v[i] - v[before]) >= step_K ? v[i] - v[before] : 0;
+  };
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    const double away_K = step(k);
+    if (away_K == 0) continue;
+    for (std::size_t m = k + 1; m < read.size() && t[read[m]] - t[read[k]] <= longest_s; ++m) {
+      if (step(m) * away_K >= 0 || std::abs(v[read[m]] - v[read[k - 1]]) > back_share * std::abs(away_K)) continue;
+      loose.insert(loose.end(), read.begin() + static_cast<std::ptrdiff_t>(k),
+                   read.begin() + static_cast<std::ptrdiff_t>(m));
+      k = m;
+      break;
+    }
+  }
+  return loose;
+}
+
 /// Rows that say more than so many times what ever lasts for two: an overload of one row is a load, and comes again; a
 /// hundred times the heat of what lasts is none. None where they are many.
 std::vector<std::size_t> load_glitches(const Log& log, Role role, double times) {
@@ -383,6 +411,8 @@ void forget_glitches(Log& log) {
   for (const Role role :
        {Role::coolant, Role::ambient, Role::core, Role::housing, Role::frame, Role::neighbour, Role::board}) {
     forget(role, temperature_glitches(log, role), "jumps away and back as no temperature can:", "reading", "readings");
+    forget(role, readings_of_a_loose_sensor(log, role), "steps away and back at once, as of a loose sensor:", "reading",
+           "readings");
   }
   for (const Role role : {Role::current, Role::id, Role::iq, Role::power}) {
     const double times = role == Role::power ? 100 : 10;

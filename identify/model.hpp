@@ -26,6 +26,8 @@ struct Model {
   S cooling_from_s = S(0);
   double uneven_per_A2 = 0;  // times i^4 of a standing rotor: what its uneven phases heat more than the inputs have
   S sensor_share = S(0);     // the housing sensor reads housing + share * (winding - housing)
+  S winding_lag_s = S(0);    // of what reads the winding, first order
+  bool winding_lags = false;
   bool offset = false, delayed = false, drifts = false, stalls = false, cooling_changes = false, feels_winding = false;
 };
 

@@ -360,6 +360,8 @@ bool Problem::possible(const Cause& cause) const {
       }
       return amps && n * square > 1.1 * sum * sum;
     }
+    case Needs::winding:  // a resistance is not late
+      return any([](const Bins& b) { return b.has_core && b.core_reference.readings == 0; });
     case Needs::neighbour:
       return any([](const Bins& b) { return b.has_neighbour; });
     case Needs::frame:

@@ -167,6 +167,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   const bool lags = value_of(set.housing.lag_s) > 0;
   const bool reads_straight = set.housing.gain_error == 0 && set.housing.offset_K == 0;
   S lagged(0), keep(0), mean_keep(0), left(0);
+  S felt(0), keep_felt(0);  // of a winding's sensor that lags
   std::size_t begun = 0;
   // After a pause a further mass goes on from where it is; that this depends on the earlier start is left out.
   const auto begin = [&](const Initial<S>& from) {
@@ -177,6 +178,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
     if (begun > 0 && lags && !std::isnan(read)) lagged = housing_behind(set.housing, S(read));
     T[model.core] = from.core_degC;
     if (model.hot_node >= 0) T[model.hot_node] = from.core_degC;
+    felt = from.core_degC;
     ++begun;
   };
   using std::exp;
@@ -184,6 +186,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
     keep = exp(-log.width_s / set.housing.lag_s);
     mean_keep = (1.0 - keep) * set.housing.lag_s / log.width_s;
   }
+  if (model.winding_lags) keep_felt = exp(-log.width_s / model.winding_lag_s);
 
   // What copper warms by for each unit of Bin::core_ahead, at 25 degC.
   const auto& copper = set.sources[0];
@@ -234,7 +237,22 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
       if (bin.core_n > 0) degC += ran_ahead(node, K_per_ahead, bin.core_ahead);
       return degC;
     };
+    const auto copper_of = [&](const Vector& at) {
+      return model.hot_node < 0 ? S(at[model.core])
+                                : at[model.core] * (1 - model.hot_share) + at[model.hot_node] * model.hot_share;
+    };
+    S behind_winding(0), off_winding(0);
+    if (model.winding_lags) {  // as the housing's above; what ran ahead inside a bin is smoothed away
+      behind_winding = (copper_of(next) - copper_of(T)) * model.winding_lag_s / log.width_s;
+      off_winding = felt - copper_of(T) + behind_winding;
+      felt = copper_of(next) - behind_winding + off_winding * keep_felt;
+    }
     const auto winding = [&] {
+      if (model.winding_lags) {
+        const double at = static_cast<double>(bin.core_at);
+        return copper_of(T) + (copper_of(next) - copper_of(T)) * at - behind_winding +
+               off_winding * exp(-log.width_s * at / model.winding_lag_s);
+      }
       S core = read(model.core, core_K);
       if (model.hot_node >= 0) core = core * (1 - model.hot_share) + read(model.hot_node, hot_K) * model.hot_share;
       return core;

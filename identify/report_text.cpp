@@ -162,8 +162,9 @@ std::string gain_conditions(const Gain& g) {
 
 std::vector<GainLine> gain_lines(const Gain& g) {
   const auto seconds = [](double s) { return std::isfinite(s) ? fmt::format("{:.1f} s", s) : std::string("no end"); };
-  return {{"the winding passes its limit by", fmt::format("{:.1f} K", g.overshoot_before_K),
-           fmt::format("{:.1f} K", g.overshoot_after_K)},
+  // Enamel is gone long before: how much more says nothing.
+  const auto over = [](double K) { return K > 200 ? std::string("more than 200 K") : fmt::format("{:.1f} K", K); };
+  return {{"the winding passes its limit by", over(g.overshoot_before_K), over(g.overshoot_after_K)},
           {"the push is promised for", seconds(g.burst_s_before), seconds(g.burst_s_after)},
           {"the current promised for an hour is", fmt::format("{:.2f} A", g.continuous_A_before),
            fmt::format("{:.2f} A", g.continuous_A_after)}};

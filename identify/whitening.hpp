@@ -75,7 +75,7 @@ struct Foretold {
 /// where each has its own. So averaged, residuals have the covariance 1 + S S^T, whose inverse is 1 - S (1 + S^T S)^-1
 /// S^T.
 struct Averaged {
-  static constexpr std::size_t most = 12;
+  static constexpr std::size_t most = 14;
   std::vector<Leeway> effects;  // whitened
   Eigen::MatrixXd inverse;      // (1 + S^T S)^-1
   double log_determinant = 0;

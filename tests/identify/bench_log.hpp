@@ -28,6 +28,7 @@ struct BenchOptions {
   double white_K = 0.2, slow_K = 0.05, step_K = 0.1;  // housing sensor
   double sensor_share = 0;                            // of the way from housing to winding, where that sensor sits
   double core_every_s = 0, core_white_K = 0.2;        // 0: no winding reading
+  double core_lag_s = 0;                              // of the sensor in the winding
   double ohm_noise_share = 0;                         // > 0: the winding tells its resistance instead, so noisy
   double power_gain = 0;                              // > 0: power is logged instead of current, true heat times this
   std::uint64_t seed = 1;
@@ -48,7 +49,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
   using State = std::array<double, 4>;  // three phases, housing
   State T;
   T.fill(o.start_degC);
-  double slow = o.slow_K * normal(random), current = 0, until = 0;
+  double felt = o.start_degC, slow = o.slow_K * normal(random), current = 0, until = 0;
   const double dt = 0.02;
   const int per_row = static_cast<int>(std::lround(1 / (o.rate_Hz * dt)));
   const double keep = std::exp(-1 / (o.rate_Hz * 20));
@@ -68,6 +69,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
     }
     slow = keep * slow + std::sqrt(1 - keep * keep) * o.slow_K * normal(random);
     const double core = (T[0] + T[1] + T[2]) / 3;
+    felt += (core - felt) * (o.core_lag_s > 0 ? 1 - std::exp(-1 / (o.rate_Hz * o.core_lag_s)) : 1);
     double housing = T[3] + o.sensor_share * (core - T[3]) + slow + o.white_K * normal(random);
     if (o.step_K > 0) housing = o.step_K * std::round(housing / o.step_K);
     const double amplitude = current * 2 / std::sqrt(3.0);
@@ -83,7 +85,7 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
         if (o.ohm_noise_share > 0)  // copper, of two phases
           out << m.ohm / 0.75 * (1 + 0.00393 * (core - 20)) * (1 + o.ohm_noise_share * normal(random));
         else
-          out << core + o.core_white_K * normal(random);
+          out << felt + o.core_white_K * normal(random);
         next_core = row + std::lround(o.core_every_s * o.rate_Hz);
       }
     }

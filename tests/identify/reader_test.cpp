@@ -618,6 +618,18 @@ TEST(Reader, ATemperatureBelowZeroKelvinIsASensorThatDidNotAnswer) {
   says(complaint(rows_with([](int i) { return i < 50 ? "-32768" : ""; })), "-80 to 600 degC is possible");
 }
 
+TEST(Masks, ReadingsOfALooseSensorAreMaskedAndThoseOfAWindingAreNot) {
+  const std::string text = rows_with([](int i) { return i >= 80 && i < 120 ? fmt::format("{}", 150 + i % 2) : ""; });
+  const Log log = read(text)[0];
+  EXPECT_EQ(identify::count_told(log.of(Role::housing)), 160u);
+  says(fmt::format("{}", fmt::join(log.notes, " ")), "as of a loose sensor: 40 readings masked, the first at 80.0 s");
+  std::string core = text;
+  core.replace(core.find("housing"), 7, "core");
+  EXPECT_EQ(identify::count_told(read(core)[0].of(Role::core)), 200u);
+  const std::string stays = rows_with([](int i) { return i >= 80 ? fmt::format("{}", 150 + i % 2) : ""; });
+  EXPECT_EQ(identify::count_told(read(stays)[0].of(Role::housing)), 200u);
+}
+
 TEST(Reader, TheIndexThatPandasWritesHasAName) {
   ColumnMap map;
   add_column(map, "time_s=#1");

@@ -325,6 +325,50 @@ TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
   EXPECT_GE(seen, 2) << "of four that are told a still room: what this test is about";
 }
 
+TEST(Report, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
+  double most = 0, most_of_curvature = 0;
+  for (const double exponent : {0.05, 0.1}) {
+    tests::BenchOptions options;
+    options.seconds = 1200;
+    options.white_K = 0.05;
+    options.slow_K = 0.02;
+    options.step_K = 0.02;
+    options.extra_housing_W = [&](double, double, double housing_degC) {
+      const double rise_K = std::max(0.0, housing_degC - options.ambient_degC);
+      return rise_K / options.motor.R2 * (1 - std::pow(rise_K / 30, exponent));
+    };
+    const auto logs = tests::bench_logs({options});
+    const double right = std::log(options.motor.R1 * options.motor.ohm);  // in units of one ohm
+    const identify::ParameterLine R1 = identify::discover(logs, std::nullopt).baseline[0];
+    most = std::max(most, std::abs(std::log(R1.value) - right) / (R1.std_error / R1.value));
+    const identify::Problem problem = identify::problem_of(logs, std::nullopt);
+    const identify::ParameterLine of_curvature = identify::base_lines(problem, identify::fit_baseline(problem), 1)[0];
+    most_of_curvature = std::max(most_of_curvature, std::abs(std::log(of_curvature.value) - right) /
+                                                        (of_curvature.std_error / of_curvature.value));
+  }
+  EXPECT_LT(most, 3);
+  EXPECT_GT(most_of_curvature, 3) << "what this test is about";
+}
+
+TEST(Report, ALateSensorInTheWindingIsNamedAndTheMotorBehindItFound) {
+  for (const double lag_s : {0.0, 2.0, 8.0}) {
+    tests::BenchOptions options;
+    options.seconds = 1800;
+    options.core_every_s = 0.1;
+    options.core_lag_s = lag_s;
+    const identify::Report report = report_of(options);
+    if (lag_s == 0) {
+      EXPECT_EQ(report.verdict, Verdict::adequate) << report.sentence;
+      continue;
+    }
+    ASSERT_EQ(report.causes.size(), 1u) << lag_s << ": " << report.sentence;
+    EXPECT_EQ(report.causes[0].id, "winding_sensor_lag") << lag_s;
+    EXPECT_NEAR(report.causes[0].parameters[0].value, lag_s, 0.1 * lag_s);
+    EXPECT_NEAR(report.extended[0].value, options.motor.R1, 0.05 * options.motor.R1);
+    EXPECT_NEAR(report.extended[2].value, options.motor.C1, 0.1 * options.motor.C1);
+  }
+}
+
 TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
   tests::BenchOptions options;
   options.seconds = 1200;
