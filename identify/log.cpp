@@ -8,13 +8,11 @@
 #include <iterator>
 #include <numeric>
 
+#include "identify/clock.hpp"
 #include "identify/filled.hpp"
 #include "identify/masks.hpp"
-#include "identify/median.hpp"
 #include "identify/pauses.hpp"
 #include "identify/rows.hpp"
-#include "identify/units.hpp"
-#include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -24,143 +22,6 @@ using wire::pc::Exit;
 using wire::pc::UserError;
 
 [[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
-
-const std::array<std::string, role_count>& own_names() {
-  static const std::array<std::string, role_count> names = {"time_s",       "current_A",
-                                                            "id_A",         "iq_A",
-                                                            "phase_a_A",    "phase_b_A",
-                                                            "phase_c_A",    "power_W",
-                                                            "torque_Nm",    "speed_rad_per_s",
-                                                            "bus_V",        "bus_A",
-                                                            "core_degC",    "housing_degC",
-                                                            "ambient_degC", "coolant_degC",
-                                                            "frame_degC",   "neighbour_housing_degC",
-                                                            "board_degC",   "winding_ohm",
-                                                            "session"};
-  return names;
-}
-
-Role role_named(const std::string& name, const std::string& where) {
-  for (std::size_t r = 0; r < role_count; ++r) {
-    if (own_names()[r] == name) return static_cast<Role>(r);
-  }
-  throw UserError(Exit::usage, fmt::format("{}: there is no role '{}'{} (roles: {}).", where, name,
-                                           wire::pc::did_you_mean(name, {own_names().begin(), own_names().end()}),
-                                           fmt::join(own_names(), ", ")));
-}
-
-std::size_t index_of(const Table& table, const Source& source) {
-  return static_cast<std::size_t>(table.find(source.column));
-}
-
-/// The map, as far as the table bears it out.
-std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
-  std::map<Role, Source> found;
-  for (auto [role, source] : map.columns) {
-    // "T:K" may be a name as a whole, and says the unit all the same.
-    if (table.find(source.column) < 0 && table.find(source.said) >= 0) source.column = source.said;
-    if (table.find(source.column) < 0) {
-      const std::size_t colon = source.column.rfind(':');
-      const std::string no_unit =
-          source.unit_said || colon == std::string::npos
-              ? ""
-              : fmt::format(", and '{}' is no unit for a column '{}' (units: {})", source.column.substr(colon + 1),
-                            source.column.substr(0, colon), fmt::join(unit_names(), ", "));
-      throw UserError(Exit::usage,
-                      fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file,
-                                  source.column, own_name(role), wire::pc::did_you_mean(source.column, table.names),
-                                  no_unit, fmt::join(table.names, ", ")));
-    }
-    found[role] = source;
-  }
-  return found;
-}
-
-/// Adds own names of columns that the map does not give to another role, in other units too (current_mA). Of housing_K,
-/// whose unit is a letter that may mean anything, and of two such names a sentence asks.
-void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Source>& found) {
-  const auto mapped = [&](const std::string& header) {
-    return std::any_of(map.columns.begin(), map.columns.end(),
-                       [&](const auto& m) { return m.second.column == header; });
-  };
-  for (std::size_t r = 0; r < role_count; ++r) {
-    const Role role = static_cast<Role>(r);
-    const std::string& name = own_name(role);
-    if (found.contains(role)) continue;
-    if (table.find(name) >= 0 && !mapped(name)) {
-      found[role] = {name};
-      continue;
-    }
-    const std::size_t cut = role == Role::neighbour ? name.rfind('_') : name.find('_');
-    if (cut == std::string::npos) continue;
-    std::string taken;
-    for (const std::string& header : table.names) {
-      if (mapped(header) || !header.starts_with(name.substr(0, cut + 1))) continue;
-      const std::string unit = header.substr(cut + 1);
-      if (const auto known = unit_named(unit); !known || known->quantity != quantity_of(name.substr(cut + 1))) continue;
-      if (unit.size() == 1)
-        refuse(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
-                           table.file, header, unit, name, name, header, unit));
-      if (!taken.empty())
-        refuse(fmt::format("{}: columns '{}' and '{}' may both be {}; say which with --column {}=NAME.", table.file,
-                           taken, header, name, name));
-      taken = header;
-    }
-    if (!taken.empty()) found[role] = {taken};
-  }
-}
-
-/// Some few words among a column's numbers say that nothing was read, as OL and Error do; else the first is refused.
-void take_words(const Table& table, std::size_t column, Role role, std::vector<std::string>& notes) {
-  constexpr double few = 0.05;  // of the numbers
-  const Words& words = table.words[column];
-  const std::size_t count = words.count();
-  if (count == 0 || role == Role::session) return;
-  if (words.like_numbers || static_cast<double>(count) > few * static_cast<double>(count_told(table.columns[column])))
-    refuse(table.complaints[column]);
-  notes.push_back(fmt::format("Cells of column '{}' with a word in them ('{}') count as not read: {}.",
-                              table.names[column], words.seen.front(), count));
-}
-
-/// Where each role comes from, and in which unit; a note says which units nobody typed.
-std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::vector<std::string>& notes) {
-  std::map<Role, Source> found = from_map(table, map);
-  add_own_names(table, map, found);
-  std::vector<std::string> by_row, by_name;
-  for (auto& [role, source] : found) {
-    for (const auto& [other, same] : found) {
-      if (other < role && same.column == source.column)
-        refuse(fmt::format("{}: column '{}' cannot be both {} and {}; map another one.", table.file, source.column,
-                           own_name(other), own_name(role)));
-    }
-    if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
-      refuse(
-          fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
-    take_words(table, index_of(table, source), role, notes);
-    if (source.unit_said) continue;
-    std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
-    if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
-    std::vector<std::string>& by = unit.empty() ? by_name : by_row;
-    if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
-    // "T [case]" tells no unit; "[Umdr./min]" tells one.
-    if (const std::string told = bracketed(source.column); unit.empty() && told.find_first_of("/^%") != told.npos)
-      notes.push_back(fmt::format(
-          "The unit '{}' of column '{}' is not known and not used; say --column {}={}:UNIT if it "
-          "is not the one in {} (units: {}).",
-          told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
-    if (!unit.empty())
-      apply_unit(unit, own_name(role),
-                 fmt::format("{}: the row of units below the header, column '{}' (--column {}={}:UNIT overrules it)",
-                             table.file, source.column, own_name(role), source.column),
-                 Exit::unusable, source.factor, source.offset);
-    if (source.factor != 1 || source.offset != 0) by.push_back(fmt::format("{} in {}", own_name(role), unit));
-  }
-  if (!by_row.empty())
-    notes.push_back(fmt::format("Units are taken from the row below the header: {}.", fmt::join(by_row, ", ")));
-  if (!by_name.empty())
-    notes.push_back(fmt::format("Units are taken from the columns' names: {}.", fmt::join(by_name, ", ")));
-  return found;
-}
 
 void check_range(const Log& log, Role role, double low, double high, const std::string& unit) {
   for (const double v : log.of(role)) {
@@ -349,113 +210,6 @@ void check_order(const Log& log) {
                   log.name));
 }
 
-/// A clock that counts from 1970 and in no seconds. 1e11 s is in the year 5138.
-void check_epoch(const Log& log, double first_cell) {
-  if (log.of(Role::time).front() < 1e11) return;
-  const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
-  refuse(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say --column time_s=COLUMN:{}.",
-                     log.name, first_cell, unit, unit));
-}
-
-void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
-  const auto& t = log.of(Role::time);
-  const std::vector<double> spacing_s = spacing(t);
-  std::vector<std::size_t> falls;
-  for (std::size_t i = 1; i < t.size(); ++i) {
-    if (t[i] < t[i - 1]) falls.push_back(i);
-  }
-  if (falls.empty()) return;
-  constexpr double correction_s = 5;  // a clock that is set right by another jumps by less
-  const std::size_t first = falls.front();
-  const std::string what_to_do =
-      *std::min_element(spacing_s.begin(), spacing_s.end()) < -correction_s
-          ? "(two recordings joined, or two clocks); split the file there or give it a session column"
-      : falls.size() > 2
-          ? fmt::format("and in {} places (rows out of order); sort the rows by time", falls.size())
-          : fmt::format(
-                "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
-                "the file there",
-                t[first - 1] - t[first] + median(spacing_s));
-  refuse(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
-                     table.line[rows[first]], t[first - 1], t[first], what_to_do));
-}
-
-/// Sorts rows of which some few, each for itself, stand up to five too late, as of messages that overtook each other;
-/// how many did. A clock that was set back stays so for more than a row.
-std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time) {
-  constexpr std::size_t most_late = 5;
-  constexpr double most_share = 0.05;
-  std::size_t moved = 0, latest = 0;
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    if (time[rows[i]] >= time[rows[latest]]) {
-      latest = i;
-      continue;
-    }
-    const bool alone = latest + 1 == i;
-    if (!alone || (i > most_late && time[rows[i]] < time[rows[i - most_late - 1]])) return 0;
-    ++moved;
-  }
-  if (static_cast<double>(moved) > most_share * static_cast<double>(rows.size())) return 0;
-  std::stable_sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) { return time[a] < time[b]; });
-  return moved;
-}
-
-/// Times told too coarsely for the rows, in whole seconds most often: rows that share one are spread until the next.
-void spread_shared_times(Log& log) {
-  std::vector<double>& t = log.of(Role::time);
-  std::vector<std::size_t> first = {0};
-  for (std::size_t i = 1; i < t.size(); ++i) {
-    if (t[i] != t[i - 1]) first.push_back(i);
-  }
-  if (first.size() < 3 || t.size() < 2 * first.size()) return;
-  const std::vector<double> told_s = t;
-  std::vector<double> steps_s;
-  for (std::size_t k = 1; k < first.size(); ++k) steps_s.push_back(told_s[first[k]] - told_s[first[k - 1]]);
-  const double step_s = median(steps_s);
-  std::vector<double> rows;
-  for (std::size_t k = 1; k < first.size(); ++k) rows.push_back(static_cast<double>(first[k] - first[k - 1]));
-  const double usual = median(rows);
-  first.push_back(t.size());
-  for (std::size_t k = 0; k + 1 < first.size(); ++k) {
-    // The log may begin and end within a step; what is missing of the first is missing before it.
-    const double count = std::max(usual, static_cast<double>(first[k + 1] - first[k]));
-    const double skipped = k == 0 ? count - static_cast<double>(first[1]) : 0;
-    for (std::size_t i = first[k]; i < first[k + 1]; ++i)
-      t[i] = told_s[i] + step_s * (static_cast<double>(i - first[k]) + skipped) / count;
-  }
-  log.notes.push_back(
-      fmt::format("About {:g} rows share each time; they are spread over the {:g} s to the next.", usual, step_s));
-}
-
-/// Takes rows away that say again, time and all, what the row before them says; how many.
-std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, const std::vector<double>& time) {
-  const auto same = [&](std::size_t a, std::size_t b) {
-    return time[a] == time[b] && std::all_of(table.columns.begin(), table.columns.end(), [&](const auto& column) {
-             return column[a] == column[b] || (std::isnan(column[a]) && std::isnan(column[b]));
-           });
-  };
-  const auto end = std::unique(rows.begin(), rows.end(), same);
-  const auto repeated = static_cast<std::size_t>(rows.end() - end);
-  rows.erase(end, rows.end());
-  return repeated;
-}
-
-/// A time of day that falls by half a day or more has passed midnight; one that rises by nearly a day is a row from
-/// before it, out of order.
-void pass_midnights(Log& log) {
-  constexpr double day_s = 86400, near_s = 600;
-  double before_s = 0;
-  int midnights = 0;
-  for (double& t : log.of(Role::time)) {
-    midnights += (before_s - t > day_s / 2) - (midnights > 0 && t - before_s > day_s - near_s);
-    before_s = t;
-    t += day_s * midnights;
-  }
-  if (midnights > 0)
-    log.notes.push_back(fmt::format("The clock passes midnight {} time{}; a day is added each time.", midnights,
-                                    midnights == 1 ? "" : "s"));
-}
-
 /// The mean of the middle half: of two both count, and one reading of three that went wrong does not. Missing when
 /// there is none.
 double middle(std::vector<double> v) {
@@ -569,61 +323,6 @@ void note_unused(Log& log) {
     log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
 }
 
-/// The first column whose name has one of these in it, as a command line takes it; NAME where none has.
-std::string likely_column(const Table& table, const std::vector<const char*>& parts) {
-  for (const std::string& name : table.names) {
-    const std::string low = in_small(name);
-    if (std::any_of(parts.begin(), parts.end(), [&](const char* p) { return low.find(p) != std::string::npos; }))
-      return name.find_first_of(" ()[]'&;$*?") == std::string::npos ? name : "\"" + name + "\"";
-  }
-  return "NAME";
-}
-
-/// All that is missing at once, each with the column that its name speaks for.
-void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
-  struct Need {
-    std::vector<Role> any_of;
-    const char *what, *hint;
-    std::vector<const char*> names;  // parts of likely ones, in small letters
-  };
-  const Need needs[] = {{{Role::time},
-                         "a time column",
-                         "call it time_s, say --column time_s={}, or --period S where the rows are S seconds apart",
-                         {"time", "zeit", "stamp"}},
-                        {{Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque},
-                         "the heat input (current_A, iq_A, power_W or torque_Nm)",
-                         "map it with --column current_A={}",
-                         {"current", "curr", "strom", "amp"}},
-                        {{Role::housing, Role::core},
-                         "a measured temperature (housing_degC or core_degC)",
-                         "map it with --column housing_degC={}",
-                         {"temp", "degc", "\u00b0c", "t_"}}};
-  std::vector<std::string> missing_ones, hints;
-  for (const Need& need : needs) {
-    if ((by_row && need.any_of.front() == Role::time) ||
-        std::any_of(need.any_of.begin(), need.any_of.end(), [&](Role r) { return found.contains(r); }))
-      continue;
-    missing_ones.emplace_back(need.what);
-    hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.names)));
-  }
-  if (!missing_ones.empty())
-    refuse(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
-                       missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), fmt::join(table.names, ", ")));
-}
-
-/// A column of the time since the first row of a session, of rows that are a period apart.
-Source give_clock(Table& table, const std::vector<Session>& sessions, double period_s) {
-  std::vector<double> time_s(table.rows(), missing);
-  for (const auto& [name, rows] : sessions) {
-    for (std::size_t i = 0; i < rows.size(); ++i) time_s[rows[i]] = static_cast<double>(i) * period_s;
-  }
-  table.names.push_back("--period");
-  table.columns.push_back(std::move(time_s));
-  table.words.emplace_back();
-  table.of_day.push_back(false);
-  return {table.names.back()};
-}
-
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
@@ -689,36 +388,6 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
 
 }  // namespace
 
-std::string roles_and_units() {
-  return fmt::format("roles: {}\nunits: {}", fmt::join(own_names(), ", "), fmt::join(unit_names(), ", "));
-}
-
-const std::string& own_name(Role role) { return own_names()[static_cast<std::size_t>(role)]; }
-
-void add_column(ColumnMap& map, const std::string& text, const std::string& from) {
-  const std::string where = from + text;
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos) {
-    throw UserError(Exit::usage, where + ": write it as role=column or role=column:unit.");
-  }
-  const Role role = role_named(std::string(trimmed(std::string_view(text).substr(0, equals))), where);
-  const std::string rest(trimmed(std::string_view(text).substr(equals + 1)));
-  const std::size_t colon = rest.rfind(':');
-  if (rest.empty() || colon == 0) {
-    throw UserError(Exit::usage, where + ": the column's name is missing behind '='.");
-  }
-  Source source{rest};
-  source.said = rest;
-  // What is no unit belongs to the column's name.
-  if (colon != std::string::npos && unit_named(rest.substr(colon + 1))) {
-    source.column = trimmed(std::string_view(rest).substr(0, colon));
-    apply_unit(rest.substr(colon + 1), own_name(role), where, Exit::usage, source.factor, source.offset);
-    source.unit_said = true;
-  }
-  if (!map.columns.emplace(role, source).second)
-    throw UserError(Exit::usage, where + ": " + own_name(role) + " was given a column before; give each role one.");
-}
-
 bool resumes(const Log& log, double after_s, double until_s) {
   return std::any_of(log.resumes_s.begin(), log.resumes_s.end(), [&](double s) { return s > after_s && s <= until_s; });
 }
@@ -782,7 +451,6 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   if (by_row && has(Role::time))
     throw UserError(Exit::usage, fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.",
                                              table.file, found.at(Role::time).column));
-  refuse_without_columns(table, found, by_row);
   std::vector<std::size_t> known;
   for (const auto& [role, source] : found) {
     if (role != Role::session) known.push_back(index_of(table, source));

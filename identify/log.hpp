@@ -13,74 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "identify/column_map.hpp"
 #include "identify/table.hpp"
 #include "wire/motor.hpp"
 
 namespace identify {
-
-/// What a column may be. Bus and board are read and checked, and nothing is made of them yet; winding_ohm becomes core
-/// where the start of a log tells its temperature, phases become current, torque becomes iq where nothing else tells
-/// the heat.
-enum class Role {
-  time,
-  current,
-  id,
-  iq,
-  phase_a,
-  phase_b,
-  phase_c,
-  power,
-  torque,
-  speed,
-  bus_V,
-  bus_A,
-  core,
-  housing,
-  ambient,
-  coolant,
-  frame,
-  neighbour,
-  board,
-  winding_ohm,
-  session,
-  count
-};
-inline constexpr std::size_t role_count = static_cast<std::size_t>(Role::count);
-/// What flows and turns.
-inline constexpr Role load_roles[] = {Role::current, Role::id, Role::iq, Role::power, Role::speed};
-
-/// What is read in degC, the motor's own first.
-inline constexpr Role temperatures[] = {Role::core,  Role::housing,   Role::ambient, Role::coolant,
-                                        Role::frame, Role::neighbour, Role::board};
-
-/// Every role and every unit that a column may be given, one line each, for --help.
-std::string roles_and_units();
-
-/// The name under which a role is recognised without a map, unit included ("housing_degC").
-const std::string& own_name(Role role);
-
-struct Source {
-  std::string column;
-  double factor = 1, offset = 0;  // SI = factor * (cell + offset)
-  bool unit_said = false;         // else a row of units in the table may say it, or the column's name
-  std::string said = "";          // column and unit as they were written
-};
-
-/// Which column plays which role, and how its unit becomes ours.
-struct ColumnMap {
-  std::map<Role, Source> columns;
-  double period_s = missing;      // from row to row of logs without a clock
-  double ambient_degC = missing;  // of logs without a sink
-  std::string rows;               // "motor=left": only these (rows.hpp)
-  std::string note;               // what a person should know of these logs, printed in the report
-};
-
-/// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and, where wanted, a
-/// note and period_s.
-ColumnMap read_map(const std::string& path);
-
-/// Adds "role=column" or "role=column:unit" to a map; `from`: where it was said, for complaints.
-void add_column(ColumnMap& map, const std::string& text, const std::string& from = "--column ");
 
 /// Where copper's straight line, 0.393 %/K of 20 degC, has no resistance left: from there a winding's temperature goes
 /// in proportion to it.

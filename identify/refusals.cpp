@@ -410,13 +410,15 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   // motor that is more than two masses; read the other way round it does not follow the load.
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
-  const Physical p = physical(found.chosen.fit.x);
-  if (both && p.C1_J_per_K > C1_of_C2.most * beyond_catalogues * p.C2_J_per_K &&
+  double winding_of_housing = 0;  // a cause may imitate what the other column was
+  for (const Fit* f : {&found.base.fit, &found.chosen.fit, &best})
+    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
+  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
       follows_as_well_swapped(problem, best, logs, motor)) {
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",
-        p.C1_J_per_K / p.C2_J_per_K);
+        winding_of_housing);
   }
   return unlike_the_motor(problem, found, logs);
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "identify/median.hpp"
+#include "identify/units.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {
@@ -242,12 +243,23 @@ bool number(std::string_view s, bool decimal_comma, double& value) {
   return true;
 }
 
+/// A number with a unit behind it, as dashboards export them: 22.9 °C.
+bool number_and_unit(std::string_view cell, bool decimal_comma, double& value, std::string& unit) {
+  const std::size_t blank = cell.rfind(' ');
+  if (blank == std::string_view::npos) return false;
+  unit = cell.substr(blank + 1);
+  return unit_named(unit) && number(trimmed(cell.substr(0, blank)), decimal_comma, value);
+}
+
 /// No number in it and something else: the row of units that some loggers write below the header.
 bool all_words(const std::vector<std::string_view>& cells, bool decimal_comma) {
-  double unused = 0;
-  return std::none_of(cells.begin(), cells.end(),
-                      [&](auto cell) { return !means_missing(cell) && number(cell, decimal_comma, unused); }) &&
-         !std::all_of(cells.begin(), cells.end(), means_missing);
+  double value = 0;
+  std::string unit;
+  const auto told = [&](std::string_view cell) {
+    return !means_missing(cell) &&
+           (number(cell, decimal_comma, value) || number_and_unit(cell, decimal_comma, value, unit));
+  };
+  return std::none_of(cells.begin(), cells.end(), told) && !std::all_of(cells.begin(), cells.end(), means_missing);
 }
 
 /// What a quoted cell says, in one line.
@@ -314,7 +326,9 @@ bool heads_a_table(std::vector<std::string_view> cells, char separator, std::str
     if (!split(row, separator, cells)) continue;
     const auto is_number = [&](std::string_view cell) {
       double value = missing;
-      return number(cell, separator != ',', value) && !std::isnan(value);
+      std::string unit;
+      return (number(cell, separator != ',', value) || number_and_unit(cell, separator != ',', value, unit)) &&
+             !std::isnan(value);
     };
     const auto numbers = std::count_if(cells.begin(), cells.end(), is_number),
                told = std::count_if(cells.begin(), cells.end(), [](auto cell) { return !means_missing(cell); });
@@ -387,10 +401,23 @@ void take(Words& words, std::string_view cell, std::size_t row) {
   words.of_row.push_back(static_cast<std::size_t>(at - words.seen.begin()) + 1);
 }
 
+/// The same of a cell that may name its unit too. All cells of a column must have one unit.
+bool number_of_column(Table& table, std::size_t column, std::string_view cell, bool decimal_comma, double& value) {
+  if (number(cell, decimal_comma, value)) return true;
+  std::string unit;
+  if (!number_and_unit(cell, decimal_comma, value, unit)) return false;
+  table.units.resize(table.names.size());
+  const auto told = [](double x) { return !std::isnan(x); };
+  const auto& above = table.columns[column];
+  if (table.units[column].empty() && std::none_of(above.begin(), above.end(), told)) table.units[column] = unit;
+  return table.units[column] == unit;
+}
+
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     double value = missing, unused = 0;
-    if (!number(cells[c], decimal_comma, value)) {
+    if (!number_of_column(table, c, cells[c], decimal_comma, value)) {
+      value = missing;
       Words& words = table.words[c];
       const bool like_number = cells[c].find_first_of("0123456789") != std::string_view::npos;
       take(words, cells[c], table.rows());

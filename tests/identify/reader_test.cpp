@@ -140,7 +140,7 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   EXPECT_DOUBLE_EQ(logs[0].of(Role::time)[1], 1.5);
   EXPECT_DOUBLE_EQ(logs[0].of(Role::iq)[1], 2);
   EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
-  says(logs[0].notes.front(), "Units are taken from the row below the header: time_s in ms, housing_degC in °F.");
+  says(logs[0].notes.front(), "Units are taken from the table: time_s in ms, housing_degC in °F.");
   ColumnMap said;
   add_column(said, "housing_degC=T:degC");
   EXPECT_DOUBLE_EQ(read(text, said)[0].of(Role::housing)[0], 50);
@@ -597,10 +597,29 @@ TEST(Reader, AColumnMayBeInPartsOfAUnit) {
        "looks like parts of a degree; say --column housing_degC=COLUMN:0.01degC");
 }
 
+TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
+  const Log log = read(head + "0 s,900 mA,293.15 K\n60 s,1000 mA,294.15 K\n")[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::current)[0], 0.9);
+  EXPECT_NEAR(log.of(Role::housing)[1], 21, 1e-9);
+  says(log.notes[0], "Units are taken from the table: current_A in mA, housing_degC in K.");
+  says(complaint(head + "0,900 mA,20\n60,1 A,21\n"), "line 3: '1 A' in column 'current_A' is not a number");
+  says(complaint(head + "0,9 %,20\n60,1 A,21\n"), "line 2: '9 %'");
+}
+
+TEST(Reader, AColumnCalledTimeIsTheTime) {
+  for (const char* name : {"time", "Timestamp", "_time", "Zeit", "t"}) {
+    const Log log = read(std::string(name) + ",current_A,housing_degC\n0,1,20\n5,2,21\n")[0];
+    EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 5);
+    says(log.notes[0], fmt::format("Column '{}' is taken for the time", name));
+  }
+  EXPECT_DOUBLE_EQ(read("Time (ms),current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
+  says(complaint("time,t,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
+}
+
 TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
-  const std::string sentence = complaint("Time [s],Current [A],T_winding [C]\n0,1,20\n1,1,21\n");
+  const std::string sentence = complaint("Start time [s],Current [A],T_winding [C]\n0,1,20\n1,1,21\n");
   says(sentence, "a time column and the heat input (current_A, iq_A, power_W or torque_Nm) and a measured temperature");
-  says(sentence, "--column time_s=\"Time [s]\"");
+  says(sentence, "--column time_s=\"Start time [s]\"");
   says(sentence, "--column current_A=\"Current [A]\"");
   says(sentence, "--column housing_degC=\"T_winding [C]\"");
 }
@@ -692,7 +711,7 @@ TEST(Reader, ALineOfTenMegabytesIsRefused) {
 TEST(Reader, BinaryIsRefused) { says(complaint(head + std::string("0,1,\0", 5) + "\n"), "not a text file"); }
 TEST(Reader, AMissingColumnIsNamedWithWhatThereIs) {
   says(complaint("time_s,current_A\n0,1\n1,1\n"), "a measured temperature (housing_degC or core_degC) is missing");
-  says(complaint("t,current_A,housing_degC\n0,1,20\n"), "time column is missing");
+  says(complaint("when,current_A,housing_degC\n0,1,20\n"), "time column is missing");
   says(complaint("time_s,housing_degC\n0,20\n"), "heat input");
 }
 TEST(Reader, ATorqueTellsTheCurrentWhereNothingElseDoes) {
