@@ -106,7 +106,7 @@ std::vector<Session> sessions_of(const Table& table, int column) {
 std::string several_motors(const Table& table, std::size_t heat, std::size_t temperature,
                            const std::vector<std::size_t>& known) {
   constexpr std::size_t most = 16;            // motors of one robot's leg, arm or hand
-  constexpr double in_turn = 0.5, apart = 3;  // of the rows; times as far as each motor's own temperature moves
+  constexpr double in_turn = 0.7, apart = 3;  // of the rows (of a sign by chance a half); times each motor's own steps
   for (std::size_t c = 0; c < table.names.size(); ++c) {
     if (std::find(known.begin(), known.end(), c) != known.end()) continue;
     std::vector<std::string> key, values;

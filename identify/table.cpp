@@ -345,7 +345,8 @@ bool begins_below(std::string_view rest) {
     const char separator = separator_of(rest);
     const std::string_view row = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(row.size() + 1, rest.size()));
-    if (split(row, separator, cells) && heads_a_table(cells, separator, rest)) return true;
+    if (split(row, separator, cells) && all_words(cells, separator != ',') && heads_a_table(cells, separator, rest))
+      return true;
   }
   return false;
 }
