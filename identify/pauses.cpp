@@ -158,6 +158,8 @@ std::vector<Log> parts_between_pauses(Log log) {
   for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
     part.sink_degC = first_degC(log);
+    part.sink_typed = log.sink_typed;
+    part.torque_for_A = log.torque_for_A;
     part.core_reference = log.core_reference;
     const std::size_t readings = std::max(count_told(part.of(Role::housing)), count_told(part.of(Role::core)));
     if (to - from >= least_rows && readings >= least_readings)

@@ -1197,6 +1197,20 @@ TEST(Pauses, ARoomThatWasTypedOnceIsThatOfEveryPart) {
   ASSERT_EQ(logs.size(), 2u);
   EXPECT_EQ(logs[1].of(Role::ambient).front(), 19);
 }
+TEST(Pauses, WhatIsSoOfALogIsSoOfItsParts) {
+  std::string text = "time_s,torque_Nm,housing_degC\n";
+  for (int i = 0; i < 1200; ++i) {
+    if (i < 200 || i >= 1000) text += fmt::format("{},2,{}\n", i, 20 + 0.03 * i);
+  }
+  ColumnMap map;
+  map.ambient_degC = 19;
+  const auto logs = read(text, map);
+  ASSERT_EQ(logs.size(), 2u);
+  for (const Log& log : logs) {
+    EXPECT_TRUE(log.torque_for_A) << "took newton metres for amperes";
+    EXPECT_TRUE(log.sink_typed);
+  }
+}
 TEST(Pauses, ACurrentThatIsNotWrittenForAWhileIsOneAlsoAtTheEnd) {
   const auto logs = read(recording(400, [](int i, double& current_A, double&) {
     if ((i >= 100 && i < 200) || i >= 340) current_A = std::nan("");

@@ -300,6 +300,7 @@ TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
 }
 
 TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   int seen = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     tests::BenchOptions options;
@@ -326,6 +327,7 @@ TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
 }
 
 TEST(Report, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   double most = 0, most_of_curvature = 0;
   for (const double exponent : {0.05, 0.1}) {
     tests::BenchOptions options;
@@ -351,6 +353,7 @@ TEST(Report, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
 }
 
 TEST(Report, ALateSensorInTheWindingIsNamedAndTheMotorBehindItFound) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   for (const double lag_s : {0.0, 2.0, 8.0}) {
     tests::BenchOptions options;
     options.seconds = 1800;
