@@ -139,6 +139,24 @@ std::string likely_column(const Table& table, const std::vector<const char*>& pa
   return "NAME";
 }
 
+/// Databases and dashboards export one value a row, beside what it is of.
+void refuse_one_value_a_row(const Table& table) {
+  const auto any = [&](std::initializer_list<std::string_view> of) {
+    const auto at = std::find_if(table.names.begin(), table.names.end(), [&](const std::string& name) {
+      return std::find(of.begin(), of.end(), in_small(name)) != of.end();
+    });
+    return at == table.names.end() ? std::string() : *at;
+  };
+  const std::string value = any({"_value", "value", "state"});
+  const std::string of =
+      any({"_field", "field", "entity_id", "metric", "signal", "signal_name", "channel", "variable"});
+  if (!value.empty() && !of.empty())
+    refuse(
+        fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
+                    "quantity has a column, and export it again.",
+                    table.file, value, of));
+}
+
 /// All that is missing at once, each with the column that its name speaks for.
 void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
   struct Need {
@@ -166,9 +184,10 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
     missing_ones.emplace_back(need.what);
     hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.names)));
   }
-  if (!missing_ones.empty())
-    refuse(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
-                       missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), fmt::join(table.names, ", ")));
+  if (missing_ones.empty()) return;
+  refuse_one_value_a_row(table);
+  refuse(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
+                     missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), fmt::join(table.names, ", ")));
 }
 
 }  // namespace

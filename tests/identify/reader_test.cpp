@@ -606,6 +606,11 @@ TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
   says(complaint(head + "0,9 %,20\n60,1 A,21\n"), "line 2: '9 %'");
 }
 
+TEST(Reader, OneValueARowIsRefusedWithWhatToDo) {
+  says(complaint("time,_field,_value\n0,current,1\n0,temp,20\n1,current,1\n"),
+       "each row has one value ('_value') and what it is of ('_field'); pivot the table");
+}
+
 TEST(Reader, AColumnCalledTimeIsTheTime) {
   for (const char* name : {"time", "Timestamp", "_time", "Zeit", "t"}) {
     const Log log = read(std::string(name) + ",current_A,housing_degC\n0,1,20\n5,2,21\n")[0];
