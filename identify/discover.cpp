@@ -322,7 +322,7 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
   return out;
 }
 
-/// Of all that is stated or may be given to a board.
+/// Makes the errors of what is stated, or may be given to a board, as wide as an unseen winding leaves them.
 void widen_along_ridges(const Problem& problem, Search& found) {
   const auto widen = [&](Fit& f) {
     if (!f.valid()) return;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cassert>
 #include <cmath>
 #include <vector>
 
@@ -81,6 +82,7 @@ struct Averaged {
   double log_determinant = 0;
 
   explicit Averaged(const Problem& problem) : effects(problem.leeway) {
+    assert(effects.size() <= most);
     Eigen::Index n = 0;
     for (const Leeway& effect : effects) {
       first.push_back(n);
