@@ -15,6 +15,8 @@ namespace console {
 
 using Json = nlohmann::ordered_json;
 using wire::pc::Exit;
+using wire::pc::refuse;
+using wire::pc::refuse_data;
 using wire::pc::UserError;
 
 struct Options {

@@ -62,10 +62,9 @@ std::vector<Target> Dictionary::named(const std::string& name, const std::string
     });
     const std::string hint =
         begun != known.end() ? fmt::format(", did you mean '{}'?", *begun) : wire::pc::did_you_mean(name, known);
-    throw wire::pc::UserError(
-        wire::pc::Exit::usage,
-        fmt::format("{}he board has no {} '{}'{} 'hotcore {}' lists them.", where.empty() ? "T" : where + ": t", kind_,
-                    name, hint.empty() ? ";" : hint, kind_ == "signal" ? "signals" : "get"));
+    wire::pc::refuse(fmt::format("{}he board has no {} '{}'{} 'hotcore {}' lists them.",
+                                 where.empty() ? "T" : where + ": t", kind_, name, hint.empty() ? ";" : hint,
+                                 kind_ == "signal" ? "signals" : "get"));
   }
   return found;
 }

@@ -11,15 +11,13 @@
 namespace console {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
+using wire::pc::refuse;
 
 double value_of(const Values& values, const std::string& name) {
   const auto at = values.find(name);
   if (at == values.end() || std::isnan(at->second)) {
-    throw UserError(Exit::usage,
-                    fmt::format("{} is {} on this axis; set it from the motor's sheet first, then identify.", name,
-                                at == values.end() ? "not known" : "unset"));
+    refuse(fmt::format("{} is {} on this axis; set it from the motor's sheet first, then identify.", name,
+                       at == values.end() ? "not known" : "unset"));
   }
   return double{at->second};
 }

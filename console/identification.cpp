@@ -45,10 +45,9 @@ void run_identify(std::vector<std::string> arguments, const std::string& json, b
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   const int code = child > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 127;
-  if (code == 127)
-    throw UserError(Exit::unusable, "The program identify was not found; build it or put it beside hotcore.");
+  if (code == 127) refuse_data("The program identify was not found; build it or put it beside hotcore.");
   if (code != 0 && !std::filesystem::exists(json))
-    throw UserError(Exit::unusable, "identify could not use the log; its sentence stands above, the log is kept.");
+    refuse_data("identify could not use the log; its sentence stands above, the log is kept.");
 }
 
 Values values_of(Session& session, int axis) {
@@ -129,8 +128,7 @@ void identify(Console& console, const Arguments& a) {
 
   std::ifstream in(json);
   const auto answer = nlohmann::json::parse(in, nullptr, false);
-  if (!answer.is_object())
-    throw UserError(Exit::unusable, json + ": identify left no answer there; run it on the log by hand.");
+  if (!answer.is_object()) refuse_data(json + ": identify left no answer there; run it on the log by hand.");
   const std::string sentence = answer.value("sentence", std::string());
   const Offer offered = offer(answer, model, double{before.at("housing_noise_K")});
   std::string text = sentence + "\n";

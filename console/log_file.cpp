@@ -13,6 +13,7 @@
 namespace console {
 
 using wire::pc::Exit;
+using wire::pc::refuse;
 using wire::pc::UserError;
 
 std::string column_name(const Target& signal) {
@@ -38,7 +39,7 @@ LogFile::LogFile(const std::string& path, const std::string& preamble, const std
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   out_.open(unfinished_, std::ios::binary);
   out_ << preamble << "time_s," << fmt::format("{}", fmt::join(columns, ",")) << "\n";
-  if (!out_) throw UserError(Exit::usage, path + ": cannot be written; choose another folder or make room.");
+  if (!out_) refuse(path + ": cannot be written; choose another folder or make room.");
 }
 
 LogFile::~LogFile() {
@@ -61,11 +62,10 @@ void LogFile::add(double time_s, const std::vector<float>& values) {
 
 void LogFile::finish() {
   out_.close();
-  if (!out_) throw UserError(Exit::usage, path_ + ": the disk is full; make room and log again.");
+  if (!out_) refuse(path_ + ": the disk is full; make room and log again.");
   std::error_code error;
   std::filesystem::rename(unfinished_, path_, error);
-  if (error)
-    throw UserError(Exit::usage, path_ + ": cannot be written (" + error.message() + "); choose another place.");
+  if (error) refuse(path_ + ": cannot be written (" + error.message() + "); choose another place.");
   finished_ = true;
 }
 

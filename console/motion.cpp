@@ -120,13 +120,13 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
   float whole_s = 0;
   for (const Piece& piece : profile_in(course, wire::max_segments)) {
     if (piece.mode != wire::ControlMode::current)
-      throw UserError(Exit::usage, "The look-ahead takes amperes; write the course as \"20A 0.3s, 6A 5s\".");
+      refuse("The look-ahead takes amperes; write the course as \"20A 0.3s, 6A 5s\".");
     segments.push_back({piece.seconds, piece.level});
     whole_s += piece.seconds;
   }
   if (!(whole_s <= wire::longest_ask_s)) {
-    throw UserError(Exit::usage, fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.",
-                                             whole_s, wire::longest_ask_s));
+    refuse(fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
+                       wire::longest_ask_s));
   }
   const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
   std::string text;

@@ -14,8 +14,7 @@
 namespace console {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
+using wire::pc::refuse;
 
 constexpr const char* common = "common";
 
@@ -48,27 +47,25 @@ std::string parameter_file(const Session& session, const std::vector<Target>& ta
 
 std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary) {
   if (!std::filesystem::is_regular_file(path))
-    throw UserError(Exit::usage, path + ": there is no such file; check the path, or write one with 'hotcore backup'.");
+    refuse(path + ": there is no such file; check the path, or write one with 'hotcore backup'.");
   const toml::table file = wire::pc::parse_toml(path);
   std::vector<Assignment> assignments;
   for (const auto& [section_key, section] : file) {
     const std::string name(section_key.str());
     if (name == "board") continue;
     if (!section.is_table()) {
-      throw UserError(Exit::usage,
-                      fmt::format("{}: '{}' stands outside [axis0], [axis1] and [common]; move it there.", path, name));
+      refuse(fmt::format("{}: '{}' stands outside [axis0], [axis1] and [common]; move it there.", path, name));
     }
     for (const auto& [key, node] : *section.as_table()) {
       const std::string full = name == common ? std::string(key.str()) : name + "." + std::string(key.str());
       const auto value = node.value<double>();
-      if (!value) throw UserError(Exit::usage, fmt::format("{}: {} is no number; repair it.", path, full));
+      if (!value) refuse(fmt::format("{}: {} is no number; repair it.", path, full));
       const std::vector<Target> targets = dictionary.named(full, path);
       assignments.push_back({targets.front(), static_cast<float>(*value)});
       if (!std::isnan(*value)) check(assignments.back(), path + ": ");
     }
   }
-  if (assignments.empty())
-    throw UserError(Exit::usage, path + ": no parameter in it; 'hotcore backup FILE' writes such a file.");
+  if (assignments.empty()) refuse(path + ": no parameter in it; 'hotcore backup FILE' writes such a file.");
   return assignments;
 }
 
@@ -76,13 +73,11 @@ void check(const Assignment& assignment, const std::string& where) {
   const Description& what = *assignment.target.what;
   const float value = assignment.value;
   if (!(value >= what.min && value <= what.max)) {
-    throw UserError(Exit::usage, fmt::format("{}{} = {:g} is out of range; it may be {:g} to {:g}{}.", where,
-                                             full_name(assignment.target), value, what.min, what.max,
-                                             what.unit.empty() || what.unit == "count" ? "" : " " + what.unit));
+    refuse(fmt::format("{}{} = {:g} is out of range; it may be {:g} to {:g}{}.", where, full_name(assignment.target),
+                       value, what.min, what.max, what.unit.empty() || what.unit == "count" ? "" : " " + what.unit));
   }
   if (what.whole_number && value != std::floor(value)) {
-    throw UserError(Exit::usage,
-                    fmt::format("{}{} = {:g} must be a whole number.", where, full_name(assignment.target), value));
+    refuse(fmt::format("{}{} = {:g} must be a whole number.", where, full_name(assignment.target), value));
   }
 }
 

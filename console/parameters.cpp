@@ -54,13 +54,13 @@ void get(Console& console, const std::vector<std::string>& names, bool names_onl
 void parse(const std::string& text, const Dictionary& dictionary, std::vector<Assignment>& assignments) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
-    throw UserError(Exit::usage, fmt::format("'{}' sets nothing; write name=value, such as current_limit_A=12.", text));
+    refuse(fmt::format("'{}' sets nothing; write name=value, such as current_limit_A=12.", text));
   const std::string name = text.substr(0, equals), value_text = text.substr(equals + 1);
   float value = 0;
   const char* end = value_text.data() + value_text.size();
   const auto [read, error] = std::from_chars(value_text.data(), end, value);
   if (error != std::errc() || read != end || !std::isfinite(value))
-    throw UserError(Exit::usage, fmt::format("{}: '{}' is not a number; write it without its unit.", name, value_text));
+    refuse(fmt::format("{}: '{}' is not a number; write it without its unit.", name, value_text));
   for (const Target& target : dictionary.named(name)) {
     assignments.push_back({target, value});
     check(assignments.back(), "");
@@ -95,7 +95,7 @@ void set(Console& console, const std::vector<std::string>& texts, bool save) {
     for (std::size_t k = 0; k < i; ++k) {
       const Target &one = assignments[i].target, &other = assignments[k].target;
       if (one.what == other.what && one.axis == other.axis)
-        throw UserError(Exit::usage, fmt::format("{} is given twice; give it one value.", full_name(one)));
+        refuse(fmt::format("{} is given twice; give it one value.", full_name(one)));
     }
   }
   apply(console, assignments, save);

@@ -63,22 +63,20 @@ std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
     }
     read = read && quantity(rest, second_units, piece.seconds);
     if (!read || rest.find_first_not_of(' ') != std::string_view::npos || !(piece.seconds > 0)) {
-      throw UserError(
-          Exit::usage,
-          fmt::format("'{}' is no piece of a course; write amperes (or Nm) and seconds, such as \"20A 0.3s, 6A 5s\".",
-                      part));
+      wire::pc::refuse(fmt::format(
+          "'{}' is no piece of a course; write amperes (or Nm) and seconds, such as \"20A 0.3s, 6A 5s\".", part));
     }
     if (!pieces.empty() && pieces.front().mode != piece.mode) {
-      throw UserError(Exit::usage,
-                      fmt::format("'{}' has another unit than the pieces before it; a course is of current "
-                                  "or of torque, write one or the other.",
-                                  part));
+      wire::pc::refuse(
+          fmt::format("'{}' has another unit than the pieces before it; a course is of current "
+                      "or of torque, write one or the other.",
+                      part));
     }
     pieces.push_back(piece);
   }
   if (pieces.empty() || pieces.size() > most) {
-    throw UserError(Exit::usage, fmt::format("The course has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".",
-                                             pieces.size(), most));
+    wire::pc::refuse(
+        fmt::format("The course has {} pieces; give 1 to {}, such as \"20A 0.3s, 6A 5s\".", pieces.size(), most));
   }
   return pieces;
 }

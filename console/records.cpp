@@ -38,11 +38,11 @@ std::vector<Target> signals_named(Console& console, const std::vector<std::strin
       if (axis < 0 || target.axis == axis || target.axis == wire::no_axis) targets.push_back(target);
     }
     if (targets.size() == before)
-      throw UserError(Exit::usage, fmt::format("{} is not of axis {}; choose --axis, or leave it out.", name, axis));
+      refuse(fmt::format("{} is not of axis {}; choose --axis, or leave it out.", name, axis));
   }
   if (targets.size() > wire::max_signals) {
-    throw UserError(Exit::usage, fmt::format("{} signals are too many; {} go at once (axis0.NAME is one axis only).",
-                                             targets.size(), wire::max_signals));
+    refuse(fmt::format("{} signals are too many; {} go at once (axis0.NAME is one axis only).", targets.size(),
+                       wire::max_signals));
   }
   return targets;
 }
@@ -178,9 +178,8 @@ void capture(Console& console, const CaptureArguments& a) {
   const std::size_t most_rows =
       session.hello().capture_words / (signals.size() + 1);  // one word a row is its time stamp
   if (std::size_t{a.pre} + a.post > most_rows) {
-    throw UserError(Exit::usage,
-                    fmt::format("{} rows of {} signals do not fit the board; at most {} rows, or fewer signals.",
-                                a.pre + a.post, signals.size(), most_rows));
+    refuse(fmt::format("{} rows of {} signals do not fit the board; at most {} rows, or fewer signals.", a.pre + a.post,
+                       signals.size(), most_rows));
   }
   std::vector<std::string> columns;
   for (const Target& signal : signals) columns.push_back(full_name(signal));

@@ -12,6 +12,7 @@ namespace {
 
 using wire::Kind;
 using wire::pc::Exit;
+using wire::pc::refuse;
 using wire::pc::UserError;
 
 // An answer takes milliseconds; the slow ones erase a flash sector (up to 2 s on an STM32F405, its data sheet's Table

@@ -146,13 +146,11 @@ std::string core_refusal(const Problem& problem, const Fit& f) {
 Fit fit_baseline(const Problem& problem) {
   Fit f = fit(problem, {});
   if (!f.valid()) {
-    throw wire::pc::UserError(
-        wire::pc::Exit::unusable,
-        fmt::format(
-            "{}: no motor{} could be so heated and stay so cool; check the units of current and "
-            "time, {}.",
-            problem.logs.front().name, problem.belief.known ? " near this sheet" : "",
-            problem.belief.known ? "whether columns are swapped, and --motor" : "and whether columns are swapped"));
+    wire::pc::refuse_data(fmt::format(
+        "{}: no motor{} could be so heated and stay so cool; check the units of current and "
+        "time, {}.",
+        problem.logs.front().name, problem.belief.known ? " near this sheet" : "",
+        problem.belief.known ? "whether columns are swapped, and --motor" : "and whether columns are swapped"));
   }
   return f;
 }

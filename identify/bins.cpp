@@ -366,9 +366,7 @@ Bins bins_of(const Log& log, double finest_s) {
 
   const auto& t = log.of(Role::time);
   const double usual_s = row_period_s(t);
-  const auto refuse = [&](const std::string& what) {
-    throw wire::pc::UserError(wire::pc::Exit::unusable, log.name + ": " + what);
-  };
+  const auto refuse = [&](const std::string& what) { wire::pc::refuse_data(log.name + ": " + what); };
   if (t.size() > 1 && !(usual_s > 0))
     refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
   if (t.size() < 30)

@@ -12,18 +12,16 @@
 namespace identify {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
-
-[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
+using wire::pc::refuse_data;
 
 }  // namespace
 
 void check_epoch(const Log& log, double first_cell) {
   if (log.of(Role::time).front() < 1e11) return;
   const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
-  refuse(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say --column time_s=COLUMN:{}.",
-                     log.name, first_cell, unit, unit));
+  refuse_data(
+      fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say --column time_s=COLUMN:{}.",
+                  log.name, first_cell, unit, unit));
 }
 
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
@@ -45,8 +43,8 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
                 "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
                 "the file there",
                 t[first - 1] - t[first] + median(spacing_s));
-  refuse(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
-                     table.line[rows[first]], t[first - 1], t[first], what_to_do));
+  refuse_data(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
+                          table.line[rows[first]], t[first - 1], t[first], what_to_do));
 }
 
 std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time) {

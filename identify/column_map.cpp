@@ -17,9 +17,8 @@ namespace identify {
 namespace {
 
 using wire::pc::Exit;
-using wire::pc::UserError;
-
-[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
+using wire::pc::refuse;
+using wire::pc::refuse_data;
 
 const std::array<std::string, role_count>& own_names() {
   static const std::array<std::string, role_count> names = {"time_s",       "current_A",
@@ -40,9 +39,9 @@ Role role_named(const std::string& name, const std::string& where) {
   for (std::size_t r = 0; r < role_count; ++r) {
     if (own_names()[r] == name) return static_cast<Role>(r);
   }
-  throw UserError(Exit::usage, fmt::format("{}: there is no role '{}'{} (roles: {}).", where, name,
-                                           wire::pc::did_you_mean(name, {own_names().begin(), own_names().end()}),
-                                           fmt::join(own_names(), ", ")));
+  refuse(fmt::format("{}: there is no role '{}'{} (roles: {}).", where, name,
+                     wire::pc::did_you_mean(name, {own_names().begin(), own_names().end()}),
+                     fmt::join(own_names(), ", ")));
 }
 
 /// The map, as far as the table bears it out.
@@ -58,10 +57,9 @@ std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
               ? ""
               : fmt::format(", and '{}' is no unit for a column '{}' (units: {})", source.column.substr(colon + 1),
                             source.column.substr(0, colon), fmt::join(unit_names(), ", "));
-      throw UserError(Exit::usage,
-                      fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file,
-                                  source.column, own_name(role), wire::pc::did_you_mean(source.column, table.names),
-                                  no_unit, fmt::join(table.names, ", ")));
+      refuse(fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file, source.column,
+                         own_name(role), wire::pc::did_you_mean(source.column, table.names), no_unit,
+                         fmt::join(table.names, ", ")));
     }
     found[role] = source;
   }
@@ -91,11 +89,11 @@ void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Sour
       const std::string unit = header.substr(cut + 1);
       if (const auto known = unit_named(unit); !known || known->quantity != quantity_of(name.substr(cut + 1))) continue;
       if (unit.size() == 1)
-        refuse(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
-                           table.file, header, unit, name, name, header, unit));
+        refuse_data(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
+                                table.file, header, unit, name, name, header, unit));
       if (!taken.empty())
-        refuse(fmt::format("{}: columns '{}' and '{}' may both be {}; say which with --column {}=NAME.", table.file,
-                           taken, header, name, name));
+        refuse_data(fmt::format("{}: columns '{}' and '{}' may both be {}; say which with --column {}=NAME.",
+                                table.file, taken, header, name, name));
       taken = header;
     }
     if (!taken.empty()) found[role] = {taken};
@@ -109,7 +107,7 @@ void take_words(const Table& table, std::size_t column, Role role, std::vector<s
   const std::size_t count = words.count();
   if (count == 0 || role == Role::session) return;
   if (words.like_numbers || static_cast<double>(count) > few * static_cast<double>(count_told(table.columns[column])))
-    refuse(table.complaints[column]);
+    refuse_data(table.complaints[column]);
   notes.push_back(fmt::format("Cells of column '{}' with a word in them ('{}') count as not read: {}.",
                               table.names[column], words.seen.front(), count));
 }
@@ -151,7 +149,7 @@ void refuse_one_value_a_row(const Table& table) {
   const std::string of =
       any({"_field", "field", "entity_id", "metric", "signal", "signal_name", "channel", "variable"});
   if (!value.empty() && !of.empty())
-    refuse(
+    refuse_data(
         fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
                     "quantity has a column, and export it again.",
                     table.file, value, of));
@@ -186,8 +184,9 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);
-  refuse(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
-                     missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), fmt::join(table.names, ", ")));
+  refuse_data(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
+                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "),
+                          fmt::join(table.names, ", ")));
 }
 
 }  // namespace
@@ -206,13 +205,13 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   const std::string where = from + text;
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) {
-    throw UserError(Exit::usage, where + ": write it as role=column or role=column:unit.");
+    refuse(where + ": write it as role=column or role=column:unit.");
   }
   const Role role = role_named(std::string(trimmed(std::string_view(text).substr(0, equals))), where);
   const std::string rest(trimmed(std::string_view(text).substr(equals + 1)));
   const std::size_t colon = rest.rfind(':');
   if (rest.empty() || colon == 0) {
-    throw UserError(Exit::usage, where + ": the column's name is missing behind '='.");
+    refuse(where + ": the column's name is missing behind '='.");
   }
   Source source{rest};
   source.said = rest;
@@ -223,25 +222,23 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
     source.unit_said = true;
   }
   if (!map.columns.emplace(role, source).second)
-    throw UserError(Exit::usage, where + ": " + own_name(role) + " was given a column before; give each role one.");
+    refuse(where + ": " + own_name(role) + " was given a column before; give each role one.");
 }
 
 ColumnMap read_map(const std::string& path) {
   if (!std::filesystem::is_regular_file(path)) {
-    throw UserError(Exit::usage, path + ": there is no such map file; the ones that come along are in identify/maps.");
+    refuse(path + ": there is no such map file; the ones that come along are in identify/maps.");
   }
   toml::table file;
   try {
     file = toml::parse_file(path);
   } catch (const toml::parse_error& error) {
-    throw UserError(Exit::usage, fmt::format("{}, line {}: {}; repair the map.", path, error.source().begin.line,
-                                             error.description()));
+    refuse(fmt::format("{}, line {}: {}; repair the map.", path, error.source().begin.line, error.description()));
   }
   for (const auto& [key, unused] : file) {
     if (key.str() != "columns" && key.str() != "note" && key.str() != "period_s") {
-      throw UserError(Exit::usage,
-                      fmt::format("{}: unknown key '{}'{} (a map holds [columns], note and period_s).", path, key.str(),
-                                  wire::pc::did_you_mean(key.str(), {"columns", "note", "period_s"})));
+      refuse(fmt::format("{}: unknown key '{}'{} (a map holds [columns], note and period_s).", path, key.str(),
+                         wire::pc::did_you_mean(key.str(), {"columns", "note", "period_s"})));
     }
   }
   ColumnMap map;
@@ -249,11 +246,10 @@ ColumnMap read_map(const std::string& path) {
   if (file.contains("period_s")) {
     map.period_s = file["period_s"].value_or(missing);
     if (!(map.period_s > 0) || std::isinf(map.period_s))
-      throw UserError(Exit::usage, path + ": period_s: write the seconds from row to row, such as 0.5.");
+      refuse(path + ": period_s: write the seconds from row to row, such as 0.5.");
   }
   const toml::table* columns = file["columns"].as_table();
-  if (columns == nullptr)
-    throw UserError(Exit::usage, path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");
+  if (columns == nullptr) refuse(path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");
   for (const auto& [role, value] : *columns) {
     const std::string name(role.str());
     std::string text;
@@ -261,16 +257,14 @@ ColumnMap read_map(const std::string& path) {
     if (const auto* table = value.as_table()) {
       for (const auto& [key, unused] : *table) {
         if (key.str() != "column" && key.str() != "unit") {
-          throw UserError(Exit::usage,
-                          fmt::format("{}: {}: unknown key '{}'; known are column and unit.", path, name, key.str()));
+          refuse(fmt::format("{}: {}: unknown key '{}'; known are column and unit.", path, name, key.str()));
         }
       }
       text = (*table)["column"].value_or(std::string());
       if (const auto unit = (*table)["unit"].value<std::string>()) text += ":" + *unit;
     }
     if (text.empty())
-      throw UserError(Exit::usage,
-                      fmt::format("{}: {}: write \"column\" or {{ column = \"...\", unit = \"rpm\" }}.", path, name));
+      refuse(fmt::format("{}: {}: write \"column\" or {{ column = \"...\", unit = \"rpm\" }}.", path, name));
     add_column(map, name + "=" + text, path + ": ");
   }
   return map;
@@ -289,11 +283,11 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
   for (auto& [role, source] : found) {
     for (const auto& [other, same] : found) {
       if (other < role && same.column == source.column)
-        refuse(fmt::format("{}: column '{}' cannot be both {} and {}; map another one.", table.file, source.column,
-                           own_name(other), own_name(role)));
+        refuse_data(fmt::format("{}: column '{}' cannot be both {} and {}; map another one.", table.file, source.column,
+                                own_name(other), own_name(role)));
     }
     if (std::count(table.names.begin(), table.names.end(), source.column) > 1)
-      refuse(
+      refuse_data(
           fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
     take_words(table, index_of(table, source), role, notes);
     if (source.unit_said) continue;

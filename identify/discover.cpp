@@ -222,9 +222,8 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
       const auto kind = [](const Log& l) {
         return l.has(Role::power) ? "a power" : l.torque_for_A ? "a torque" : "a current";
       };
-      throw wire::pc::UserError(wire::pc::Exit::unusable,
-                                fmt::format("{}: its heat is recorded as {}, that of {} as {}; give logs of one kind.",
-                                            log.name, kind(log), first.name, kind(first)));
+      wire::pc::refuse_data(fmt::format("{}: its heat is recorded as {}, that of {} as {}; give logs of one kind.",
+                                        log.name, kind(log), first.name, kind(first)));
     }
   }
   const std::pair<Role, const char*> taken[] = {{Role::speed, "nothing in it is taken to go by speed"},

@@ -18,16 +18,14 @@
 namespace identify {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
-
-[[noreturn]] void refuse(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
+using wire::pc::refuse;
+using wire::pc::refuse_data;
 
 void check_range(const Log& log, Role role, double low, double high, const std::string& unit) {
   for (const double v : log.of(role)) {
     if (v < low || v > high)
-      refuse(fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.", log.name,
-                         own_name(role), v, low, high, unit));
+      refuse_data(fmt::format("{}: {} reaches {:g}; {} to {} {} is possible: check the unit or mask the value.",
+                              log.name, own_name(role), v, low, high, unit));
   }
 }
 
@@ -65,7 +63,7 @@ void check_normalised(const Log& log) {
     return largest > 0 && largest <= most;
   };
   if (told_small(temperatures) && told_small(load_roles))
-    refuse(
+    refuse_data(
         fmt::format("{}: no column, temperatures and load, exceeds {:g}, as if they were normalised; give them as "
                     "they were measured, in degC, A and rad/s.",
                     log.name, most));
@@ -79,17 +77,17 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     const double low = lowest(log.of(role));
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
     if (low > 450)
-      refuse(
+      refuse_data(
           fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say --column "
                       "{}=COLUMN:0.01degC (or what one is worth).",
                       log.name, own_name(role), low, own_name(role)));
     if (low > 200)
-      refuse(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
-                         log.name, own_name(role), low, own_name(role)));
+      refuse_data(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
+                              log.name, own_name(role), low, own_name(role)));
     // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
     // not.
     if (role == Role::ambient && low > 55)
-      refuse(
+      refuse_data(
           fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say --column "
                       "ambient_degC=COLUMN:degF (and the same for the other temperatures).",
                       log.name, low));
@@ -99,7 +97,7 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
   // use, whatever its unit.
   const Role motor_at = log.has(Role::housing) ? Role::housing : Role::core;
   if (!log.has(sink_of(log)) && lowest(log.of(motor_at)) > 55)
-    refuse(
+    refuse_data(
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
                     "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
                     log.name, own_name(motor_at), lowest(log.of(motor_at))));
@@ -107,7 +105,7 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A)
-      refuse(
+      refuse_data(
           fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say --column "
                       "{1}=COLUMN:mA, if it is another quantity map the right column.",
                       log.name, own_name(role), peak, most_A));
@@ -127,7 +125,7 @@ void read_phases(Log& log) {
     return std::any_of(log.of(role).begin(), log.of(role).end(), [](double A) { return A < 0; });
   });
   if (told.size() == 1 || (told.size() == 2 && !alternate))
-    refuse(fmt::format(
+    refuse_data(fmt::format(
         "{}: {} {} how much flows; map all three phases (phase_a_A, phase_b_A, phase_c_A).", log.name,
         own_name(told.front()),
         alternate ? "alternates and does not tell" : "is an effective value and with one other does not tell"));
@@ -159,7 +157,7 @@ void read_torque(Log& log, const std::optional<wire::Motor>& motor) {
   log.torque_for_A = !motor;
   const double peak_A = largest_magnitude(log.of(Role::iq)), most_A = most_current_A(motor);
   if (peak_A > most_A)
-    refuse(
+    refuse_data(
         fmt::format("{}: torque_Nm takes {:.0f} A, where more than {:.0f} A cannot be; give the motor's own torque, "
                     "before any gear, in newton metres.",
                     log.name, peak_A, most_A));
@@ -204,7 +202,7 @@ void check_order(const Log& log) {
   // designed-sparse, frame_conduction 75001255).
   constexpr double clearly = 2;
   if (pairs < 10 || !(housing2 > clearly * core2) || !(together < -0.35 * std::sqrt(over2 * heat2))) return;
-  refuse(
+  refuse_data(
       fmt::format("{}: core_degC falls against housing_degC when the current rises, and moves less: the two "
                   "columns are swapped; map them with --column.",
                   log.name));
@@ -334,8 +332,8 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     if (!std::isnan(time[r])) rows.push_back(r);
   }
   if (rows.size() * 3 < chosen.size() * 2 || rows.empty())
-    refuse(fmt::format("{}: {} of {} rows have no time; record the log again.", name, chosen.size() - rows.size(),
-                       chosen.size()));
+    refuse_data(fmt::format("{}: {} of {} rows have no time; record the log again.", name, chosen.size() - rows.size(),
+                            chosen.size()));
   if (rows.size() < chosen.size())
     log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
   if (const std::size_t moved = put_in_order(rows, time); moved > 0)
@@ -363,13 +361,13 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   }
   read_phases(log);
   if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
-    refuse(name +
-           ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
+    refuse_data(name +
+                ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
   for (const Role role : {Role::current, Role::iq}) {
     const auto source = found.find(role);
     const auto alternates = [&] { return lowest(log.of(role)) < -0.5 * largest_magnitude(log.of(role)); };
     if (source != found.end() && called_like_a_phase(source->second.column) && alternates())
-      refuse(
+      refuse_data(
           fmt::format("{}: column '{}' is called like one phase, whose current alternates; map all of them "
                       "(--column phase_a_A={} and phase_b_A, phase_c_A).",
                       name, source->second.column, source->second.column));
@@ -449,8 +447,8 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   const auto has = [&](Role r) { return found.contains(r); };
   const bool by_row = !std::isnan(map.period_s);
   if (by_row && has(Role::time))
-    throw UserError(Exit::usage, fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.",
-                                             table.file, found.at(Role::time).column));
+    refuse(fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.", table.file,
+                       found.at(Role::time).column));
   std::vector<std::size_t> known;
   for (const auto& [role, source] : found) {
     if (role != Role::session) known.push_back(index_of(table, source));
@@ -461,12 +459,12 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   const std::string several = several_motors(
       table, first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
       first_of({Role::housing, Role::core}), known);
-  if (!several.empty()) refuse(several);
+  if (!several.empty()) refuse_data(several);
   const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
   const std::vector<Session> sessions = sessions_of(table, session);
   if (sessions.empty())
-    refuse(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
-                       table.file, found.at(Role::session).column));
+    refuse_data(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
+                            table.file, found.at(Role::session).column));
   if (by_row) found[Role::time] = give_clock(table, sessions, map.period_s);
   std::vector<Log> logs;
   for (const auto& [name, rows] : sessions) {

@@ -21,6 +21,8 @@ namespace {
 
 using identify::Log, identify::Verdict;
 using wire::pc::Exit;
+using wire::pc::refuse;
+using wire::pc::refuse_data;
 using wire::pc::UserError;
 
 constexpr const char* examples = R"(identify: what does the thermal simulation of this motor get wrong?
@@ -51,7 +53,7 @@ void take_columns_from_logs(Arguments& a) {
     if (column) a.columns.push_back(word);
     return column;
   });
-  if (a.logs.empty()) throw UserError(Exit::usage, "No log is named; give the path of a CSV file.");
+  if (a.logs.empty()) refuse("No log is named; give the path of a CSV file.");
 }
 
 std::vector<Log> read(const std::string& path, const identify::ColumnMap& map,
@@ -75,12 +77,12 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   if (percent) fraction /= 100;
   if (percent || *end == '\0') {
     if (!(fraction > 0 && fraction < 0.9))
-      throw UserError(Exit::usage, "--hold-out " + what + ": a fraction lies between 0 and 0.9, or 0% and 90%.");
+      refuse("--hold-out " + what + ": a fraction lies between 0 and 0.9, or 0% and 90%.");
     out.fraction = fraction;
     return out;
   }
   std::erase_if(paths, [&](const std::string& path) { return same_file(path, what); });
-  if (paths.empty()) throw UserError(Exit::usage, "--hold-out " + what + ": no log is left to fit; give another one.");
+  if (paths.empty()) refuse("--hold-out " + what + ": no log is left to fit; give another one.");
   out.logs = read(what, map, motor);
   return out;
 }
@@ -90,7 +92,7 @@ std::vector<std::string> truth_in(const std::string& path) {
   std::ifstream in(path);
   const auto json = nlohmann::json::parse(in, nullptr, false);
   if (!json.is_object() || !json.contains("causes") || !json["causes"].is_array()) {
-    throw UserError(Exit::usage, path + ": is no truth file; host-sim record --hide writes one beside each log.");
+    refuse(path + ": is no truth file; host-sim record --hide writes one beside each log.");
   }
   std::vector<std::string> ids;
   for (const auto& cause : json["causes"])
@@ -132,13 +134,12 @@ void print_confusions(const std::map<std::string, std::map<std::string, int>>& a
 /// and what was taken for what.
 int score(const Arguments& a, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
   if (a.truths.size() != a.logs.size()) {
-    throw UserError(Exit::usage,
-                    fmt::format("--score: {} truth files for {} logs; give one for each, in the same order.",
-                                a.truths.size(), a.logs.size()));
+    refuse(fmt::format("--score: {} truth files for {} logs; give one for each, in the same order.", a.truths.size(),
+                       a.logs.size()));
   }
   for (const std::string& path : a.truths) {
     if (!std::filesystem::is_regular_file(path))
-      throw UserError(Exit::usage, "--score: " + path + ": there is no such file; check the path.");
+      refuse("--score: " + path + ": there is no such file; check the path.");
   }
   std::map<std::string, int> outcomes;
   std::map<std::string, std::map<std::string, int>> answers_to;
@@ -164,15 +165,14 @@ int score(const Arguments& a, const identify::ColumnMap& map, const std::optiona
 
 void show(const std::string& text) {
   if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
-    throw UserError(Exit::usage, "standard output: cannot be written; the answer is not complete.");
+    refuse("standard output: cannot be written; the answer is not complete.");
 }
 
 /// Asked before the search, which may take minutes.
 void need_folder_of(const std::string& path) {
   const auto folder = std::filesystem::path(path).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder))
-    throw UserError(Exit::usage,
-                    fmt::format("{}: there is no folder {}; make it, or choose another place.", path, folder.string()));
+    refuse(fmt::format("{}: there is no folder {}; make it, or choose another place.", path, folder.string()));
 }
 
 int answer(Arguments a) {
@@ -199,7 +199,7 @@ int answer(Arguments a) {
   std::vector<Log> logs;
   for (const std::string& path : a.logs) {
     if (std::count_if(a.logs.begin(), a.logs.end(), [&](const auto& other) { return same_file(path, other); }) > 1)
-      throw UserError(Exit::usage, path + ": this log is named twice and would count twice; name it once.");
+      refuse(path + ": this log is named twice and would count twice; name it once.");
     for (Log& log : read(path, map, motor)) logs.push_back(std::move(log));
   }
   identify::Report report = identify::discover(logs, motor, held, [&](const std::string& what) { (*doing)(what); });
@@ -218,7 +218,7 @@ int answer(Arguments a) {
     show(as_text(report, a.explain) + (a.html.empty() ? "" : "\nReport with pictures: " + a.html + "\n"));
   }
   const std::string& asked = a.write_model.empty() ? a.write_baseline : a.write_model;
-  if (!writes && !asked.empty()) throw UserError(Exit::unusable, asked + ": not written: " + report.no_model + ".");
+  if (!writes && !asked.empty()) refuse_data(asked + ": not written: " + report.no_model + ".");
   return 0;
 }
 

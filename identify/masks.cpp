@@ -12,8 +12,7 @@
 namespace identify {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
+using wire::pc::refuse_data;
 
 /// Share of readings that are missing from a channel which is otherwise sampled at every row. A channel written every
 /// n-th row (a sparse winding reading) is judged on its own grid.
@@ -180,8 +179,7 @@ void note_missing_input(Log& log) {
     const double share = missing_of_input(log, role);
     log.missing_share = std::max(log.missing_share, share);
     if (share > most_missing) {
-      throw UserError(
-          Exit::unusable,
+      refuse_data(
           fmt::format("{}: {} is missing in {:.0f} % of the rows, so the heat that went in is not known; record it "
                       "again with every row filled.",
                       log.name, own_name(role), 100 * share));
@@ -431,8 +429,7 @@ void mask(Log& log) {
   if (log.has(Role::housing)) read_between_steps(log, Role::housing);
   if (log.has(Role::core)) read_between_steps(log, Role::core);
   if (!log.has(Role::housing) && !log.has(Role::core))
-    throw UserError(Exit::unusable,
-                    log.name + ": no temperature of the motor is left; record the housing or the winding.");
+    refuse_data(log.name + ": no temperature of the motor is left; record the housing or the winding.");
 }
 
 }  // namespace identify

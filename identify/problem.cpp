@@ -420,11 +420,9 @@ Problem problem_of(const std::vector<Log>& logs, const std::optional<wire::pc::M
   take_in(finest_s);
   if (problem.heated_by_power()) problem.belief.copper_per_K = 0;
   if (!(problem.heat_W > 0)) {
-    throw wire::pc::UserError(
-        wire::pc::Exit::unusable,
-        fmt::format(
-            "{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
-            problem.logs.front().name));
+    wire::pc::refuse_data(fmt::format(
+        "{}: no current and no power flows at all, so nothing can be learned of the motor; record a log with load.",
+        problem.logs.front().name));
   }
   if (!motor) {
     rough_search(problem);

@@ -14,8 +14,7 @@
 namespace identify {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
+using wire::pc::refuse;
 
 /// What a cell says, as a person would write it; empty: nothing.
 std::string said(const Table& table, std::size_t column, std::size_t row) {
@@ -52,13 +51,12 @@ void keep_rows(Table& table, const std::string& choice) {
   if (choice.empty()) return;
   const std::size_t equals = choice.rfind('=');
   const std::string where = "--rows " + choice;
-  if (equals == std::string::npos) throw UserError(Exit::usage, where + ": write it as COLUMN=VALUE, such as motor=2.");
+  if (equals == std::string::npos) refuse(where + ": write it as COLUMN=VALUE, such as motor=2.");
   const std::string column = choice.substr(0, equals), value = choice.substr(equals + 1);
   const int found = table.find(column);
   if (found < 0)
-    throw UserError(Exit::usage,
-                    fmt::format("{}: {} has no column '{}'{} (it has: {}).", where, table.file, column,
-                                wire::pc::did_you_mean(column, table.names), fmt::join(table.names, ", ")));
+    refuse(fmt::format("{}: {} has no column '{}'{} (it has: {}).", where, table.file, column,
+                       wire::pc::did_you_mean(column, table.names), fmt::join(table.names, ", ")));
   const auto c = static_cast<std::size_t>(found);
   std::vector<std::size_t> rows;
   std::vector<std::string> others;
@@ -69,9 +67,7 @@ void keep_rows(Table& table, const std::string& choice) {
     else if (others.size() < 20 && std::find(others.begin(), others.end(), cell) == others.end())
       others.push_back(cell);
   }
-  if (rows.empty())
-    throw UserError(Exit::usage,
-                    fmt::format("{}: no row says so; its column says: {}.", where, fmt::join(others, ", ")));
+  if (rows.empty()) refuse(fmt::format("{}: no row says so; its column says: {}.", where, fmt::join(others, ", ")));
   const auto only = [&](auto& cells) {
     for (std::size_t i = 0; i < rows.size(); ++i) cells[i] = rows[i] < cells.size() ? cells[rows[i]] : 0;
     cells.resize(rows.size());

@@ -18,8 +18,8 @@
 namespace identify {
 namespace {
 
-using wire::pc::Exit;
-using wire::pc::UserError;
+using wire::pc::refuse;
+using wire::pc::refuse_data;
 
 // A logger's row is below a kilobyte; a line of this size is a file without line ends, or not a table at all.
 constexpr std::size_t longest_line = 1 << 20;
@@ -28,14 +28,13 @@ constexpr std::size_t least_columns = 3;  // a time, what heats, and a temperatu
 std::string whole_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    throw UserError(Exit::usage, path + (std::filesystem::exists(path, error)
-                                             ? ": this is a folder or a device and no log; name a CSV file."
-                                             : ": there is no such file; check the path."));
+    refuse(path + (std::filesystem::exists(path, error) ? ": this is a folder or a device and no log; name a CSV file."
+                                                        : ": there is no such file; check the path."));
   }
   std::ifstream in(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(std::filesystem::file_size(path)), '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!in) throw UserError(Exit::usage, path + ": cannot be read; check its permissions.");
+  if (!in) refuse(path + ": cannot be read; check its permissions.");
   return text;
 }
 
@@ -356,7 +355,7 @@ std::string at_line(const Table& table, int line, const std::string& what) {
 }
 
 [[noreturn]] void refuse(const Table& table, int line, const std::string& what) {
-  throw UserError(Exit::unusable, at_line(table, line, what));
+  refuse_data(at_line(table, line, what));
 }
 
 /// LabVIEW's .lvm: what is said of the file and of its channels ends in this line each time. How many lines it took.
@@ -586,7 +585,7 @@ Table read_table(const std::string& path) {
       add_row(table, cells, separator != ',', line);
   }
   if (table.names.empty()) {
-    throw UserError(Exit::unusable, path + ": the file is empty; record a log with a header line and rows.");
+    refuse_data(path + ": the file is empty; record a log with a header line and rows.");
   }
   constexpr double most_torn = 0.01;  // of the rows: more are another table
   if (torn > 0 && torn > most_torn * static_cast<double>(table.rows())) refuse(table, first_torn, what_is_torn);
@@ -594,8 +593,7 @@ Table read_table(const std::string& path) {
     table.notes.push_back(fmt::format(
         "Lines that have not as many cells as the header were left out: {}, the first line {}.", torn, first_torn));
   if (headers > 0) table.notes.push_back(fmt::format("Lines that repeat the header were left out: {}.", headers));
-  if (table.rows() == 0)
-    throw UserError(Exit::unusable, path + ": there is a header and no row; the recording failed: record it again.");
+  if (table.rows() == 0) refuse_data(path + ": there is a header and no row; the recording failed: record it again.");
   return table;
 }
 

@@ -71,8 +71,7 @@ std::optional<std::uint64_t> seed_of(const std::string& hide) {
   if (hide.empty()) return {};
   const std::string digits = hide.rfind("seed=", 0) == 0 ? hide.substr(5) : "";
   if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) {
-    throw wire::pc::UserError(wire::pc::Exit::usage,
-                              fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
+    wire::pc::refuse(fmt::format("--hide {}: write it as seed=N with a whole number N.", hide));
   }
   return std::stoull(digits);
 }

@@ -52,14 +52,12 @@ Scene scene_of(const RecordOptions& options) {
   const bool file = options.excitation.ends_with(".toml");
   if (!file && std::find(scenes.begin(), scenes.end(), options.excitation) == scenes.end()) {
     const std::string hint = wire::pc::did_you_mean(options.excitation, known);
-    throw wire::pc::UserError(wire::pc::Exit::usage,
-                              fmt::format("There is nothing called '{}' to record{} There are: {}.", options.excitation,
-                                          hint.empty() ? "." : hint, fmt::join(known, ", ")));
+    wire::pc::refuse(fmt::format("There is nothing called '{}' to record{} There are: {}.", options.excitation,
+                                 hint.empty() ? "." : hint, fmt::join(known, ", ")));
   }
   scene = read_scene(options.excitation, options.scene_folder, {});
   if (scene.shaft.kind == Shaft::Kind::free) {
-    throw wire::pc::UserError(
-        wire::pc::Exit::usage,
+    wire::pc::refuse(
         "A scene with a free shaft cannot be repeated; record duty, designed, step, profile, or a scene with "
         "an imposed speed or a locked rotor.");
   }
@@ -70,20 +68,18 @@ Scene scene_of(const RecordOptions& options) {
 std::vector<host_sim::Demand> advised(const std::string& path) {
   using wire::pc::Exit, wire::pc::UserError;
   std::ifstream in(path);
-  if (!in)
-    throw UserError(Exit::usage, fmt::format("--profile {}: there is no such file; identify --json writes one.", path));
+  if (!in) wire::pc::refuse(fmt::format("--profile {}: there is no such file; identify --json writes one.", path));
   const nlohmann::json answer = nlohmann::json::parse(in, nullptr, false);
   const bool advice = answer.is_object() && answer.contains("experiment") && answer["experiment"].is_object() &&
                       answer["experiment"].contains("profile") && answer["experiment"]["profile"].is_array();
   if (!advice) {
-    throw UserError(Exit::usage,
-                    fmt::format("--profile {}: no experiment in it; identify advises one where causes tie.", path));
+    wire::pc::refuse(fmt::format("--profile {}: no experiment in it; identify advises one where causes tie.", path));
   }
   std::vector<host_sim::Demand> demands;
   for (const nlohmann::json& step : answer["experiment"]["profile"]) {
     const auto number = [&](const char* key) {
       const bool there = step.is_object() && step.contains(key) && step[key].is_number();
-      if (!there) throw UserError(Exit::usage, fmt::format("--profile {}: a step without the number '{}'.", path, key));
+      if (!there) wire::pc::refuse(fmt::format("--profile {}: a step without the number '{}'.", path, key));
       return step[key].get<double>();
     };
     host_sim::Demand demand;
@@ -91,11 +87,10 @@ std::vector<host_sim::Demand> advised(const std::string& path) {
     demand.speed_rad_per_s = number("speed_rad_per_s");
     const double seconds = number("seconds");
     if (!(seconds >= 0 && seconds <= 86400))
-      throw UserError(Exit::usage,
-                      fmt::format("--profile {}: a step of {:g} s; 0 to 86400 are possible.", path, seconds));
+      wire::pc::refuse(fmt::format("--profile {}: a step of {:g} s; 0 to 86400 are possible.", path, seconds));
     demands.insert(demands.end(), static_cast<std::size_t>(seconds * program_Hz), demand);
   }
-  if (demands.empty()) throw UserError(Exit::usage, fmt::format("--profile {}: the experiment has no step.", path));
+  if (demands.empty()) wire::pc::refuse(fmt::format("--profile {}: the experiment has no step.", path));
   return demands;
 }
 

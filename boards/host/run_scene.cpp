@@ -231,8 +231,7 @@ void Board::arm(int axis) {
   const wire::Status status = driver_.axis(axis).arm();
   if (status == wire::Status::done) return;
   const wire::CodeText text = wire::text_of(status);
-  throw wire::pc::UserError(wire::pc::Exit::usage,
-                            fmt::format("Axis {} would not arm: {}; {}.", axis, text.happened, text.advice));
+  wire::pc::refuse(fmt::format("Axis {} would not arm: {}; {}.", axis, text.happened, text.advice));
 }
 
 void Board::speak(const Trace& trace, Wish& wish, double time_s) {

@@ -176,8 +176,7 @@ std::string script(const Picture& picture, const std::string& output) {
 std::string svg(const Picture& picture) {
   namespace fs = std::filesystem;
   std::string folder = (fs::temp_directory_path() / "hotcore-plot-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr)
-    throw UserError(Exit::usage, "No temporary folder can be made; set TMPDIR to a folder with room.");
+  if (mkdtemp(folder.data()) == nullptr) refuse("No temporary folder can be made; set TMPDIR to a folder with room.");
   const std::string source = folder + "/plot.gp", output = folder + "/plot.svg";
   std::ofstream(source) << script(picture, output);
   const int status = std::system(fmt::format("gnuplot '{}' > '{}/messages' 2>&1", source, folder).c_str());
@@ -188,9 +187,8 @@ std::string svg(const Picture& picture) {
   std::error_code none;
   fs::remove_all(folder, none);
   if (status != 0 || text.str().empty()) {
-    throw UserError(Exit::usage, "The picture could not be drawn" +
-                                     (complaint.empty() ? std::string() : " (" + complaint + ")") +
-                                     "; ./run installs gnuplot, which draws it.");
+    refuse("The picture could not be drawn" + (complaint.empty() ? std::string() : " (" + complaint + ")") +
+           "; ./run installs gnuplot, which draws it.");
   }
   return text.str();
 }

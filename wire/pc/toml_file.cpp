@@ -26,22 +26,21 @@ std::vector<std::string> toml_names(const std::string& folder) {
 std::string find_toml(const std::string& kind, const std::string& which, const std::string& folder) {
   if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
     if (fs::is_regular_file(which)) return which;
-    throw UserError(Exit::usage, fmt::format("{}: there is no such {} file; check the path.", which, kind));
+    refuse(fmt::format("{}: there is no such {} file; check the path.", which, kind));
   }
   const std::string path = folder + "/" + which + ".toml";
   if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
   const std::vector<std::string> known = toml_names(folder);
   const std::string hint = did_you_mean(which, known);
-  throw UserError(Exit::usage, fmt::format("Unknown {} '{}'{} There are: {}.", kind, which, hint.empty() ? "." : hint,
-                                           fmt::join(known, ", ")));
+  refuse(
+      fmt::format("Unknown {} '{}'{} There are: {}.", kind, which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
 }
 
 toml::table parse_toml(const std::string& path) {
   try {
     return toml::parse_file(path);
   } catch (const toml::parse_error& error) {
-    throw UserError(Exit::usage, fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line,
-                                             error.description()));
+    refuse(fmt::format("{}: line {}: {}; mend the file.", path, error.source().begin.line, error.description()));
   }
 }
 

@@ -32,4 +32,7 @@ class UserError : public std::runtime_error {
 /// Of an option or a file that a person wrote.
 [[noreturn]] inline void refuse(const std::string& sentence) { throw UserError(Exit::usage, sentence); }
 
+/// Of what was measured.
+[[noreturn]] inline void refuse_data(const std::string& sentence) { throw UserError(Exit::unusable, sentence); }
+
 }  // namespace wire::pc

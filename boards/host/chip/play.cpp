@@ -30,14 +30,11 @@ double counts_to_degC(double counts) {
 }  // namespace
 
 std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, const std::string& motor_folder) {
-  using wire::pc::Exit;
-  using wire::pc::UserError;
   if (!std::filesystem::exists(elf)) {
-    throw UserError(Exit::usage,
-                    elf + " is missing; build it with: cmake --preset h8-15d && cmake --build --preset h8-15d");
+    wire::pc::refuse(elf + " is missing; build it with: cmake --preset h8-15d && cmake --build --preset h8-15d");
   }
   if (scene.board != "h8-15d")
-    throw UserError(Exit::usage, "The chip model has the board h8-15d only; use host-sim for " + scene.board + ".");
+    wire::pc::refuse("The chip model has the board h8-15d only; use host-sim for " + scene.board + ".");
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, motor_folder);
 
   host_sim::HeatOptions heat;
@@ -83,8 +80,8 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
   pcb.run_for(0.5 * warm_up_s - 0.03);
   if (!pcb.arm()) {
     const wire::CodeText text = wire::text_of(static_cast<wire::Status>(pcb.door().answer[0]));
-    throw wire::pc::UserError(wire::pc::Exit::usage, std::string("The image would not arm: ") + text.happened + "; " +
-                                                         text.advice + ".\n" + pcb.chip.report_text());
+    wire::pc::refuse(std::string("The image would not arm: ") + text.happened + "; " + text.advice + ".\n" +
+                     pcb.chip.report_text());
   }
 
   const bool two_axes =

@@ -55,9 +55,8 @@ void VirtualBoard::save_parameters_of_motor() {
   }
   if (answer.status == 0) return;
   const wire::CodeText text = wire::text_of(answer.status);
-  throw wire::pc::UserError(wire::pc::Exit::usage,
-                            fmt::format("This motor cannot be driven by the virtual board: parameter 0x{:04X}: {}; {}.",
-                                        answer.id, text.happened, text.advice));
+  wire::pc::refuse(fmt::format("This motor cannot be driven by the virtual board: parameter 0x{:04X}: {}; {}.",
+                               answer.id, text.happened, text.advice));
 }
 
 void VirtualBoard::power_cycle() {
