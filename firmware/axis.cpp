@@ -13,7 +13,7 @@ namespace firmware {
 namespace {
 constexpr hal::Duty released{{0.5f, 0.5f, 0.5f}, false};
 constexpr std::uint32_t forever = 0xFFFF'FFFFu;
-constexpr float blind_share = 0.6f;    // of the continuous current: reaction R2
+constexpr float blind_share = 0.6f;    // of the continuous current, while no housing reading comes
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;

@@ -366,16 +366,17 @@ Bins bins_of(const Log& log, double finest_s) {
 
   const auto& t = log.of(Role::time);
   const double usual_s = row_period_s(t);
-  const auto refuse = [&](const std::string& what) { wire::pc::refuse_data(log.name + ": " + what); };
+  const auto refuse_log = [&](const std::string& what) { wire::pc::refuse_data(log.name + ": " + what); };
   if (t.size() > 1 && !(usual_s > 0))
-    refuse("most rows have the time of the row before them; write the time with more digits, or each row once.");
+    refuse_log("most rows have the time of the row before them; write the time with more digits, or each row once.");
   if (t.size() < 30)
-    refuse(
+    refuse_log(
         fmt::format("only {} row{} over {:.1f} s, and 30 are the least to fit a motor; record more of them (a "
                     "temperature that was read now and then may leave its cell empty).",
                     t.size(), t.size() == 1 ? "" : "s", t.back()));
   if (std::isnan(first_degC(log)))
-    refuse(fmt::format("no temperature is read in its {:.0f} s; hold out less, or read the sensor earlier.", t.back()));
+    refuse_log(
+        fmt::format("no temperature is read in its {:.0f} s; hold out less, or read the sensor earlier.", t.back()));
   out.interval_s = usual_s;
   out.width_s = width_s_of(log, usual_s, finest_s);
   const auto count = static_cast<std::size_t>((t.back() + usual_s) / out.width_s + 1e-6);

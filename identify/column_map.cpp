@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 
@@ -114,7 +115,7 @@ void take_words(const Table& table, std::size_t column, Role role, std::vector<s
 
 /// The only column without a role that is called nothing but time; empty: none, or several.
 std::string called_time(const Table& table, const std::map<Role, Source>& found) {
-  constexpr std::string_view words[] = {"time", "timestamp", "elapsedtime", "datetime", "date/time", "zeit"};
+  constexpr std::string_view words[] = {"time", "timestamp", "elapsedtime", "date", "datetime", "date/time", "zeit"};
   const auto is_time = [&](const std::string& name) {
     const bool taken = std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
     std::string bare = name.substr(0, name.find_first_of("[("));
@@ -127,14 +128,39 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
   return std::count_if(table.names.begin(), table.names.end(), is_time) == 1 ? *first : "";
 }
 
-/// The first column whose name has one of these in it, as a command line takes it; NAME where none has.
-std::string likely_column(const Table& table, const std::vector<const char*>& parts) {
-  for (const std::string& name : table.names) {
-    const std::string low = in_small(name);
-    if (std::any_of(parts.begin(), parts.end(), [&](const char* p) { return low.find(p) != std::string::npos; }))
-      return name.find_first_of(" ()[]'&;$*?") == std::string::npos ? name : "\"" + name + "\"";
+/// Does a word of a name begin so? "T_case" and "motorTemp" do with "t_" and "temp", "input_speed" not with "t_".
+bool has_word(const std::string& name, std::string_view beginning) {
+  const auto letter = [&](std::size_t at) { return std::isalpha(static_cast<unsigned char>(name[at])) != 0; };
+  const auto capital = [&](std::size_t at) { return std::isupper(static_cast<unsigned char>(name[at])) != 0; };
+  const std::string low = in_small(name);
+  for (std::size_t at = low.find(beginning); at != std::string::npos; at = low.find(beginning, at + 1)) {
+    if (at == 0 || !letter(at - 1) || !letter(at) || (capital(at) && !capital(at - 1))) return true;
   }
-  return "NAME";
+  return false;
+}
+
+/// A role, and what words of its columns begin with, in small letters.
+struct Likely {
+  Role role;
+  std::vector<const char*> words;
+};
+
+/// ROLE=COLUMN, as a command line takes it, of the first words that a column has which moves; without one with NAME.
+std::string likely_column(const Table& table, const std::vector<Likely>& likely) {
+  for (const bool moves : {true, false}) {
+    for (const auto& [role, words] : likely) {
+      for (std::size_t c = 0; c < table.names.size(); ++c) {
+        const std::string& name = table.names[c];
+        const std::vector<double>& cells = table.columns[c];
+        const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
+        const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
+        if (!has || stands == moves) continue;
+        const std::string quote = name.find_first_of(" ()[]'&;$*?") == std::string::npos ? "" : "\"";
+        return own_name(role) + "=" + quote + name + quote;
+      }
+    }
+  }
+  return own_name(likely.front().role) + "=NAME";
 }
 
 /// Databases and dashboards export one value a row, beside what it is of.
@@ -160,27 +186,31 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   struct Need {
     std::vector<Role> any_of;
     const char *what, *hint;
-    std::vector<const char*> names;  // parts of likely ones, in small letters
+    std::vector<Likely> likely;
   };
   const Need needs[] = {{{Role::time},
                          "a time column",
-                         "call it time_s, say --column time_s={}, or --period S where the rows are S seconds apart",
-                         {"time", "zeit", "stamp"}},
+                         "call it time_s, say --column {}, or --period S where the rows are S seconds apart",
+                         {{Role::time, {"time", "zeit", "stamp", "date", "datum"}}}},
                         {{Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque},
                          "the heat input (current_A, iq_A, power_W or torque_Nm)",
-                         "map it with --column current_A={}",
-                         {"current", "curr", "strom", "amp"}},
+                         "map it with --column {}",
+                         {{Role::current, {"motor current", "motor_current", "current_motor", "motorcurrent"}},
+                          {Role::iq, {"iq", "q-axis", "q_axis"}},
+                          {Role::current, {"current", "curr", "strom", "amp"}},
+                          {Role::torque, {"torque", "effort", "drehmoment"}}}},
                         {{Role::housing, Role::core},
                          "a measured temperature (housing_degC or core_degC)",
-                         "map it with --column housing_degC={}",
-                         {"temp", "degc", "\u00b0c", "t_"}}};
+                         "map it with --column {}",
+                         {{Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp"}},
+                          {Role::housing, {"temp", "degc", "\u00b0c", "t_"}}}}};
   std::vector<std::string> missing_ones, hints;
   for (const Need& need : needs) {
     if ((by_row && need.any_of.front() == Role::time) ||
         std::any_of(need.any_of.begin(), need.any_of.end(), [&](Role r) { return found.contains(r); }))
       continue;
     missing_ones.emplace_back(need.what);
-    hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.names)));
+    hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.likely)));
   }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);

@@ -45,7 +45,7 @@ inline constexpr Role load_roles[] = {Role::current, Role::id, Role::iq, Role::p
 inline constexpr Role temperatures[] = {Role::core,  Role::housing,   Role::ambient, Role::coolant,
                                         Role::frame, Role::neighbour, Role::board};
 
-/// Every role and every unit that a column may be given, one line each, for --help.
+/// Every role that a column may be given on a line, and every unit on another, for --help.
 std::string roles_and_units();
 
 /// The name under which a role is recognised without a map, unit included ("housing_degC").

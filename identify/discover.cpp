@@ -321,22 +321,24 @@ Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& l
   return out;
 }
 
-/// Makes the errors of what is stated, or may be given to a board, as wide as an unseen winding leaves them.
+/// The same fit, as unsure as a winding leaves it that is neither on a sheet nor read.
+Fit as_unsure_as_unseen(const Problem& problem, Fit f) {
+  if (problem.any_core() || problem.belief.known || !f.valid()) return f;
+  Problem unsure = problem;
+  unsure.leeway = ordinary_leeway(problem, f);
+  for (Leeway& more : leeway_of_an_unseen_winding(problem, f)) unsure.leeway.push_back(std::move(more));
+  return as_wide_as_its_ridge(unsure, std::move(f));
+}
+
+/// All that is stated, or may be given to a board.
 void widen_along_ridges(const Problem& problem, Search& found) {
-  const auto widen = [&](Fit& f) {
-    if (!f.valid()) return;
-    Problem unsure = problem;
-    unsure.leeway = ordinary_leeway(problem, f);
-    for (Leeway& more : leeway_of_an_unseen_winding(problem, f)) unsure.leeway.push_back(std::move(more));
-    f = as_wide_as_its_ridge(unsure, std::move(f));
-  };
-  widen(found.base.fit);
-  widen(found.chosen.fit);
+  std::vector<Fit*> stated = {&found.base.fit, &found.chosen.fit};
   for (std::vector<Candidate>* some : {&found.singles, &found.sets}) {
     for (Candidate& c : *some) {
-      if (c.likely) widen(c.fit);
+      if (c.likely) stated.push_back(&c.fit);
     }
   }
+  for (Fit* f : stated) *f = as_unsure_as_unseen(problem, std::move(*f));
 }
 
 /// The answer with each row's current taken for what flowed before it, where that is why the load is ahead. Half a row
@@ -450,7 +452,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
-  if (!problem.any_core() && !problem.belief.known) widen_along_ridges(problem, found);
+  widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
@@ -459,7 +461,9 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty()) nearest = found.chosen.fit;
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
   const Fit two = found.base.fit.valid() ? found.base.fit : base;
-  judge_baseline(problem, two, found.base.ratio, logs, motor, report);
+  const bool wrong = poor.empty() && found.verdict != Verdict::adequate;
+  const Fit compared = wrong ? as_unsure_as_unseen(problem, closest(problem, two)) : two;
+  judge_baseline(problem, compared, found.base.ratio, logs, motor, report);
   if (!extended) found.chosen.fit = two;
   if (!poor.empty()) {
     report.verdict = found.verdict = Verdict::insufficient;
@@ -493,7 +497,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   }
   if (unseen) {
     doing("scoring what was held out");
-    report.held_out = score_held_out(*unseen, problem, held, two, nearest ? *nearest : found.chosen.fit, report);
+    report.held_out = score_held_out(*unseen, problem, held, compared, nearest ? *nearest : found.chosen.fit, report);
     if (nearest) {
       report.held_out->nearest = ids_of(nearest->chosen);
       report.held_out->like = listed(names_of(nearest->chosen), " and ");

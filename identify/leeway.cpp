@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace identify {
 namespace {
@@ -58,15 +59,116 @@ std::vector<double> off_by_reference_K(std::vector<double> core_degC, const Nois
 }
 
 /// How far apart two simulations of one log are, `times` over.
-std::vector<double> apart_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
+std::vector<double> difference_K(std::vector<double> moved, const std::vector<double>& plain, double times = 1) {
   for (std::size_t k = 0; k < moved.size(); ++k) moved[k] = (moved[k] - plain[k]) * times;
   return moved;
 }
 
-/// What the readings are moved by where unwatched rooms move in `halves` half waves over their logs.
-Leeway leeway_of_rooms(const Problem& problem, const Fit& motor, int halves) {
-  Problem moved = problem;
-  for (Bins& log : moved.logs) {
+struct Run {
+  const Problem& problem;
+  const Fit& motor;
+};
+
+/// How far the readings move from one simulation to another, `times` over.
+Leeway moved(const Run& from, const Run& to, double times = 1) {
+  Leeway out;
+  for (std::size_t l = 0; l < from.problem.logs.size(); ++l) {
+    const Replayed a = replayed(from.problem, from.motor, l), b = replayed(to.problem, to.motor, l);
+    out.housing_K.push_back(difference_K(b.housing_degC, a.housing_degC, times));
+    out.core_K.push_back(difference_K(b.core_degC, a.core_degC, times));
+  }
+  return out;
+}
+
+void forget(std::vector<std::vector<double>>& readings_K) {
+  for (std::vector<double>& log : readings_K) std::fill(log.begin(), log.end(), 0.0);
+}
+
+Leeway lateness(const Run& prompt) {
+  constexpr double lag_s = 0.2;  // short: it shows the slope
+  const Physical p = physical(prompt.motor.x);
+  const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
+  Leeway out =
+      moved(prompt, {prompt.problem, with_cause(prompt.motor, "sensor_lag", {lag_s})}, late_s / (lag_s + least_lag_s));
+  forget(out.core_K);
+  return out;
+}
+
+Leeway frame(const Run& two_resistors) {
+  const auto& [problem, motor] = two_resistors;
+  const Physical p = physical(motor.x);
+  Fit framed = with_cause(motor, "third_mass",
+                          {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
+                           std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
+  framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
+  return moved(two_resistors, {problem, framed});
+}
+
+Leeway uneven_phases(const Run& whole) {
+  Problem uneven = whole.problem;
+  uneven.warm_unevenly((1 + ordinary_uneven_share) * whole.problem.uneven_per_A2);
+  Leeway out = moved(whole, {uneven, whole.motor});
+  out.uneven_per_A2 = uneven.uneven_per_A2 - whole.problem.uneven_per_A2;
+  return out;
+}
+
+/// A winding that was read behind its row's begin, in whose interval, and one that was read ahead of it: another load
+/// begins with a row, so that the one goes by what flows, the other by what flowed.
+Leeway read_behind(const Run& prompt) {
+  constexpr double delay_s = 0.01;  // short: it shows the slope
+  Leeway out = moved(prompt, {prompt.problem, with_cause(prompt.motor, "clock_delay", {delay_s})});
+  forget(out.housing_K);
+  for (std::size_t l = 0; l < out.core_K.size(); ++l) {
+    for (double& x : out.core_K[l]) x *= ordinary_moment_share * prompt.problem.logs[l].interval_s / delay_s;
+  }
+  return out;
+}
+
+Leeway read_ahead(const Run& prompt) {
+  const auto& [problem, motor] = prompt;
+  Leeway out;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Fit half_a_row = with_cause(motor, "clock_delay", {-problem.logs[l].interval_s / 2});
+    out.core_K.push_back(difference_K(replayed(problem, half_a_row, l).core_degC, replayed(problem, motor, l).core_degC,
+                                      2 * ordinary_ahead_share));
+  }
+  out.housing_K = out.core_K;
+  forget(out.housing_K);
+  return out;
+}
+
+/// As of a current's noise that flowed; empty where no current is noisy.
+std::optional<Leeway> ripple(const Run& whole) {
+  Problem rippling = whole.problem;
+  bool ripples = false;
+  for (Bins& log : rippling.logs) {
+    ripples = ripples || log.current_noise_A > 0;
+    for (Bin& bin : log.bins)
+      bin.input[thermal::Drive::current_A2] += ordinary_ripple_share * log.current_noise_A * log.current_noise_A;
+  }
+  if (!ripples || whole.problem.heated_by_power()) return std::nullopt;
+  return moved(whole, {rippling, whole.motor});
+}
+
+/// A winding whose reference at rest was off; empty where no resistance tells one.
+std::optional<Leeway> reference(const Run& whole) {
+  const auto& [problem, motor] = whole;
+  if (std::none_of(problem.logs.begin(), problem.logs.end(),
+                   [](const Bins& b) { return b.core_reference.readings > 0; }))
+    return std::nullopt;
+  Leeway out;
+  out.of_each_log = true;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l)
+    out.core_K.push_back(off_by_reference_K(replayed(problem, motor, l).core_degC, problem.noise, problem.logs[l]));
+  out.housing_K = out.core_K;
+  forget(out.housing_K);
+  return out;
+}
+
+/// Where unwatched rooms move in `halves` half waves over their logs.
+Leeway room(const Run& whole, int halves) {
+  Problem swung = whole.problem;
+  for (Bins& log : swung.logs) {
     for (std::size_t k = 0; k < log.bins.size() && log.sink_unwatched; ++k) {
       const double share = (static_cast<double>(k) + 0.5) / static_cast<double>(log.bins.size());
       const double room_K =
@@ -74,13 +176,8 @@ Leeway leeway_of_rooms(const Problem& problem, const Fit& motor, int halves) {
       log.bins[k].input[thermal::Boundary::ambient] += room_K;
     }
   }
-  Leeway out;
+  Leeway out = moved(whole, {swung, whole.motor});
   out.of_each_log = true;
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed still = replayed(problem, motor, l), moving = replayed(moved, motor, l);
-    out.housing_K.push_back(apart_K(moving.housing_degC, still.housing_degC));
-    out.core_K.push_back(apart_K(moving.core_degC, still.core_degC));
-  }
   return out;
 }
 
@@ -97,83 +194,29 @@ Fit bare(const Fit& f) {
 
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   const Fit two_resistors = bare(motor);
-  const Physical p = physical(two_resistors.x);
-  const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  constexpr double lag_s = 0.2, delay_s = 0.01;  // short: they show the slope
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay || e == Edit::winding_lag;
   });
-  const Fit& prompt = sensor ? two_resistors : motor;
-  const Fit late = with_cause(prompt, "sensor_lag", {lag_s}), delayed = with_cause(prompt, "clock_delay", {delay_s});
-  Fit framed = with_cause(two_resistors, "third_mass",
-                          {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
-                           std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
-  framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
-  Problem uneven = problem;
-  uneven.warm_unevenly((1 + ordinary_uneven_share) * problem.uneven_per_A2);
-  Problem rippling = problem;
-  bool ripples = false;
-  for (Bins& log : rippling.logs) {
-    ripples = ripples || log.current_noise_A > 0;
-    for (Bin& bin : log.bins)
-      bin.input[thermal::Drive::current_A2] += ordinary_ripple_share * log.current_noise_A * log.current_noise_A;
-  }
-  Leeway lateness, frame, phases, moment, ahead, ripple, reference;
-  reference.of_each_log = true;
-  bool by_resistance = false;
-  phases.uneven_per_A2 = uneven.uneven_per_A2 - problem.uneven_per_A2;
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed plain = replayed(problem, two_resistors, l), lagged = replayed(problem, late, l),
-                   held = replayed(problem, framed, l), even = replayed(problem, motor, l),
-                   warmed = replayed(uneven, motor, l), heated = replayed(rippling, motor, l);
-    const Replayed& at_once = sensor ? plain : even;
-    const double row_s = problem.logs[l].interval_s;
-    // Another load begins with a row: what is read ahead of it goes by the one, what is read late by the other.
-    const Replayed after = replayed(problem, delayed, l),
-                   before = replayed(problem, with_cause(prompt, "clock_delay", {-row_s / 2}), l);
-    lateness.housing_K.push_back(apart_K(lagged.housing_degC, at_once.housing_degC, late_s / (lag_s + least_lag_s)));
-    lateness.core_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    ahead.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    moment.core_K.push_back(apart_K(after.core_degC, at_once.core_degC, ordinary_moment_share * row_s / delay_s));
-    ahead.core_K.push_back(apart_K(before.core_degC, at_once.core_degC, 2 * ordinary_ahead_share));
-    frame.housing_K.push_back(apart_K(held.housing_degC, plain.housing_degC));
-    frame.core_K.push_back(apart_K(held.core_degC, plain.core_degC));
-    phases.housing_K.push_back(apart_K(warmed.housing_degC, even.housing_degC));
-    phases.core_K.push_back(apart_K(warmed.core_degC, even.core_degC));
-    ripple.housing_K.push_back(apart_K(heated.housing_degC, even.housing_degC));
-    ripple.core_K.push_back(apart_K(heated.core_degC, even.core_degC));
-    by_resistance = by_resistance || problem.logs[l].core_reference.readings > 0;
-    reference.housing_K.emplace_back(plain.core_degC.size(), 0.0);
-    reference.core_K.push_back(off_by_reference_K(even.core_degC, problem.noise, problem.logs[l]));
-  }
-  std::vector<Leeway> out = {lateness, frame};
-  if (problem.uneven_per_A2 > 0) out.push_back(phases);
-  if (problem.noise.core_slow_K > 0) out.insert(out.end(), {ahead, moment});
-  if (ripples && !problem.heated_by_power()) out.push_back(ripple);
-  if (by_resistance) out.push_back(reference);
+  const Run whole{problem, motor}, prompt{problem, sensor ? two_resistors : motor};
+  std::vector<Leeway> out = {lateness(prompt), frame({problem, two_resistors})};
+  if (problem.uneven_per_A2 > 0) out.push_back(uneven_phases(whole));
+  if (problem.noise.core_slow_K > 0) out.insert(out.end(), {read_ahead(prompt), read_behind(prompt)});
+  if (auto more = ripple(whole)) out.push_back(std::move(*more));
+  if (auto more = reference(whole)) out.push_back(std::move(*more));
   const bool unwatched =
       std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.sink_unwatched; });
-  for (int halves = 0; unwatched && halves <= room_waves; ++halves)
-    out.push_back(leeway_of_rooms(problem, motor, halves));
+  for (int halves = 0; unwatched && halves <= room_waves; ++halves) out.push_back(room(whole, halves));
   return out;
 }
 
 std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fit& fit) {
   const Fit motor = bare(fit);
   std::vector<Leeway> out;
-  for (const auto& [id, size] : {std::pair{"natural_convection", ordinary_convection_exponent},
-                                 std::pair{"sensor_gain", ordinary_sensor_gain}}) {
-    const Fit other = with_cause(motor, id, {size});
-    Leeway& leeway = out.emplace_back();
-    for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-      const Replayed plain = replayed(problem, motor, l), moved = replayed(problem, other, l);
-      leeway.housing_K.push_back(apart_K(moved.housing_degC, plain.housing_degC));
-      leeway.core_K.push_back(apart_K(moved.core_degC, plain.core_degC));
-    }
-  }
+  for (const auto& [id, size] :
+       {std::pair{"natural_convection", ordinary_convection_exponent}, std::pair{"sensor_gain", ordinary_sensor_gain}})
+    out.push_back(moved({problem, motor}, {problem, with_cause(motor, id, {size})}));
   return out;
 }
 
@@ -193,13 +236,7 @@ Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
       if (sum_A4 > 0) A2 *= 1 + ordinary_load_share * A2 * sum_A2 / sum_A4;
     }
   }
-  Leeway out;
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed plain = replayed(problem, two_resistors, l), moved = replayed(bent, two_resistors, l);
-    out.housing_K.push_back(apart_K(moved.housing_degC, plain.housing_degC));
-    out.core_K.push_back(apart_K(moved.core_degC, plain.core_degC));
-  }
-  return out;
+  return moved({problem, two_resistors}, {bent, two_resistors});
 }
 
 }  // namespace identify

@@ -42,14 +42,29 @@ bool far_too_slow(const Problem& problem, const Fit& f) {
   return !problem.belief.known && p.R2_K_per_W * p.C2_J_per_K > 1e5 && determines_housing(problem, f);
 }
 
+/// Of all its parts: what hangs on the housing, or is hot in the winding, may take up most of the heat.
+double heat_capacity_J_per_K(const Problem& problem, const Fit& f) {
+  const Physical p = physical(f.x);
+  double out = p.C1_J_per_K + p.C2_J_per_K;
+  Eigen::Index at = base_count;
+  for (const Chosen& chosen : f.chosen) {
+    const Cause& cause = cause_of(chosen);
+    for (std::size_t i = 0; i < cause.parameters.size(); ++i, ++at) {
+      if (std::string_view(cause.parameters[i].unit) == "J/K")
+        out += parameter_value(problem, cause, static_cast<int>(i), f.x[at]);
+    }
+  }
+  return out;
+}
+
 /// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
 /// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
 /// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
 std::string unlike_the_motor(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
   const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
   for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
-    const Physical p = physical(f->x);
-    if (in_air && p.R2_K_per_W * (p.C1_J_per_K + p.C2_J_per_K) < 20 && determines_housing(problem, *f))
+    const double settles_s = physical(f->x).R2_K_per_W * heat_capacity_J_per_K(problem, *f);
+    if (in_air && settles_s < 20 && determines_housing(problem, *f))
       return fmt::format(
           "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
           "--column time_s=COLUMN:min{}.",

@@ -122,8 +122,9 @@ std::string candidates(const Report& r) {
   for (const Rung& rung : r.ladder) most = std::max(most, rung.evidence);
   std::string s = fmt::format(
       "<h2>Candidates</h2><p>Evidence of each alone over the two-resistor model; {:g} are asked for before anything is "
-      "named, and a lead of {:g} before one is named alone.</p><table class=ladder>\n",
-      Margins{}.detect, Margins{}.tie);
+      "named, and a lead of {:g} ({:g} without a motor sheet, and of pairs) before one is named.</p><table "
+      "class=ladder>\n",
+      Margins{}.detect, Margins{}.tie_alone, Margins{}.tie);
   for (const Rung& rung : r.ladder) {
     // Evidence spans decades: the bar is its square root.
     const double width = 100 * std::sqrt(std::max(0.0, rung.evidence) / most);

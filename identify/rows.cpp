@@ -112,7 +112,9 @@ std::string several_motors(const Table& table, std::size_t heat, std::size_t tem
       if (std::find(values.begin(), values.end(), key.back()) == values.end()) values.push_back(key.back());
       changes += r > 0 && key[r] != key[r - 1];
     }
-    if (values.size() < 2 || values.size() > most || std::find(values.begin(), values.end(), "") != values.end() ||
+    constexpr std::size_t least_rows = 5;  // of each: what hardly comes again is a reading and no name
+    if (values.size() < 2 || values.size() > most || table.rows() < least_rows * values.size() ||
+        std::find(values.begin(), values.end(), "") != values.end() ||
         static_cast<double>(changes) < in_turn * static_cast<double>(table.rows()))
       continue;
     // A column of message kinds changes in turn as well, and each kind fills cells of its own.

@@ -338,7 +338,8 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
 
 /// The first parameter of the causes that its bound holds against evidence worth more than `tie`; empty when none does.
 /// What lies at a bound, or near it, is held there by noise half of the time. Nothing at all may well be true, and of a
-/// share all.
+/// share all. A capacity or a resistance at its bound is no part of a motor, whatever the evidence: a hot spot that is
+/// heavier than any winding stands for another law.
 std::string held_by_a_bound(const Fit& f, double tie) {
   const Eigen::MatrixXd covariance = f.covariance(false);
   Eigen::Index at = base_count;
@@ -346,7 +347,7 @@ std::string held_by_a_bound(const Fit& f, double tie) {
     for (const Parameter& p : cause_of(chosen).parameters) {
       const bool all = cause_of(chosen).edit == Edit::sensor_share, none = p.low == 0 && !(f.x[at] > 0);
       const double gain = f.gradient[at] * f.gradient[at] * covariance(at, at);  // of a parabola, were the bound let go
-      if (f.at_bound[static_cast<std::size_t>(at++)] && !all && !none && gain > tie) return p.name;
+      if (f.at_bound[static_cast<std::size_t>(at++)] && !all && !none && (p.logarithmic || gain > tie)) return p.name;
     }
   }
   return "";
@@ -435,7 +436,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   if (!beyond.empty() && names_causes(out.verdict)) {
     out.verdict = Verdict::unknown_cause;
     out.steps.push_back(
-        fmt::format("Yet the {} in {} would have to lie beyond its bound: none of the known causes "
+        fmt::format("Yet the {} in {} lies at its bound, or would have to lie beyond it: none of the known causes "
                     "explains this.",
                     beyond, listed(out.chosen.fit.chosen)));
   }

@@ -354,7 +354,7 @@ std::string at_line(const Table& table, int line, const std::string& what) {
   return fmt::format("{}, line {}: {}", table.file, line, what);
 }
 
-[[noreturn]] void refuse(const Table& table, int line, const std::string& what) {
+[[noreturn]] void refuse_line(const Table& table, int line, const std::string& what) {
   refuse_data(at_line(table, line, what));
 }
 
@@ -376,9 +376,9 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
   std::vector<std::string_view> header = row;
   if (numbers &&
       (!split(remark, separator, header) || header.size() != row.size() || !all_words(header, separator != ','))) {
-    refuse(table, line,
-           "numbers where the header should be; put a line with column names (such as "
-           "time_s,current_A,housing_degC) first.");
+    refuse_line(table, line,
+                "numbers where the header should be; put a line with column names (such as "
+                "time_s,current_A,housing_degC) first.");
   }
   while (header.size() > 1 && header.back().empty()) header.pop_back();
   for (const auto name : header) table.names.push_back(one_line(trimmed(name)));
@@ -521,15 +521,16 @@ Table read_table(const std::string& path) {
   Table table;
   table.file = path;
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
-    refuse(table, 1, "the file is UTF-16; save it as UTF-8 text.");
+    refuse_line(table, 1, "the file is UTF-16; save it as UTF-8 text.");
   if (!is_utf8(text)) text = from_latin_1(text);
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');  // old Macintosh's
   std::string_view rest = text;
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   if (is_json(rest)) {
-    refuse(table, 1,
-           "this is JSON; write it as CSV: a line of column names (such as time_s,current_A,housing_degC), then one "
-           "line a row.");
+    refuse_line(
+        table, 1,
+        "this is JSON; write it as CSV: a line of column names (such as time_s,current_A,housing_degC), then one "
+        "line a row.");
   }
   char separator = ',';
   std::vector<std::string_view> cells;
@@ -544,12 +545,12 @@ Table read_table(const std::string& path) {
     lines = 1 + static_cast<int>(std::count(row.begin(), row.end(), '\n'));
     rest.remove_prefix(closed ? end + 1 : rest.size());
     if (row.size() > longest_line) {
-      refuse(table, line,
-             fmt::format("{:.1f} MB without a line end; a table has one row a line: export the log again.",
-                         static_cast<double>(row.size()) / 1e6));
+      refuse_line(table, line,
+                  fmt::format("{:.1f} MB without a line end; a table has one row a line: export the log again.",
+                              static_cast<double>(row.size()) / 1e6));
     }
     if (row.find('\0') != std::string_view::npos)
-      refuse(table, line, "a zero byte; this is not a text file: export the log as CSV.");
+      refuse_line(table, line, "a zero byte; this is not a text file: export the log as CSV.");
     const std::string_view bare = trimmed(row);  // not the row itself: a tab may stand for an empty cell
     if (bare.empty()) continue;
     if (bare.front() == '#') {
@@ -558,7 +559,8 @@ Table read_table(const std::string& path) {
     }
     if (table.names.empty()) {
       if (bare.find_first_not_of(",;\t\" ") == std::string_view::npos) continue;
-      if (!split(row, separator, cells)) refuse(table, line, "a quote is opened and never closed; repair the header.");
+      if (!split(row, separator, cells))
+        refuse_line(table, line, "a quote is opened and never closed; repair the header.");
       if (!heads_a_table(cells, separator, rest) && begins_below(rest)) continue;
       if (name_columns(table, cells, remark, separator, line)) continue;
     }
@@ -571,7 +573,7 @@ Table read_table(const std::string& path) {
           lines > 1 ? fmt::format(", one of them in quotes until line {}", line + lines - 1) : "",
           closed ? "; repair or delete this line."
                  : " and the file ends in it, so it was cut off; delete the last line or copy the file again.");
-      if (!whole || !closed || lines > 1) refuse(table, line, wrong);
+      if (!whole || !closed || lines > 1) refuse_line(table, line, wrong);
       if (torn++ == 0) first_torn = line, what_is_torn = wrong;
       continue;
     }
@@ -588,7 +590,7 @@ Table read_table(const std::string& path) {
     refuse_data(path + ": the file is empty; record a log with a header line and rows.");
   }
   constexpr double most_torn = 0.01;  // of the rows: more are another table
-  if (torn > 0 && torn > most_torn * static_cast<double>(table.rows())) refuse(table, first_torn, what_is_torn);
+  if (torn > 0 && torn > most_torn * static_cast<double>(table.rows())) refuse_line(table, first_torn, what_is_torn);
   if (torn > 0)
     table.notes.push_back(fmt::format(
         "Lines that have not as many cells as the header were left out: {}, the first line {}.", torn, first_torn));

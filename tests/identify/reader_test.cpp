@@ -457,6 +457,12 @@ std::string two_motors(const std::string& column, const char* one, const char* o
   return text;
 }
 
+TEST(Rows, ATemperatureOfAMotorIsNoNameOfOne) {
+  std::string text = "time_s,current_A,housing_degC,motor FET temp\n";
+  for (int i = 0; i < 15; ++i) text += fmt::format("{},{},{},{}\n", i, i % 3, 20 + 0.1 * i, 25 + 0.01 * i);
+  EXPECT_EQ(read(text)[0].of(Role::time).size(), 15u);
+}
+
 TEST(Rows, OfSeveralMotorsAreRefusedAndThoseOfOneAreRead) {
   const std::string text = two_motors("motor", "left", "right");
   says(complaint(text),
@@ -627,6 +633,15 @@ TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
   says(sentence, "--column time_s=\"Start time [s]\"");
   says(sentence, "--column current_A=\"Current [A]\"");
   says(sentence, "--column housing_degC=\"T_winding [C]\"");
+}
+
+TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
+  const std::string robot = complaint("input_speed,output_torque,timestamp_ms,temp\n1,1,1,20\n1,2,2,21\n");
+  says(robot, "--column torque_Nm=output_torque");  // a timestamp is no "amp"
+  says(robot, "--column housing_degC=temp");        // nor "input_speed" a "t_"
+  const std::string dyno = complaint("Input current,Motor q-axis current,FET temp\n0,1,20\n0,2,21\n");
+  says(dyno, "--column iq_A=\"Motor q-axis current\"");  // the supply's never moves
+  says(complaint("I_bus,t\n1,0\n2,1\n"), "--column current_A=NAME");
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
@@ -955,11 +970,6 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
 TEST(Map, AUnitOfAnotherQuantityIsRefused) {
   ColumnMap map;
   EXPECT_THROW(identify::add_column(map, "speed_rad_per_s=n:degF"), UserError);
-}
-TEST(Map, TheMapsThatComeAlongAreRead) {
-  for (const auto& entry : std::filesystem::directory_iterator(HOTCORE_SOURCE_DIR "/identify/maps")) {
-    EXPECT_NO_THROW(identify::read_map(entry.path().string())) << entry.path();
-  }
 }
 
 TEST(Masks, AFrozenStretchOfAMovingChannelIsFound) {

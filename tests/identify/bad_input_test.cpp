@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: MIT
+// Logs that are spoilt get a plain sentence, and never a confident name.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <sstream>
+
+#include "identify/discover.hpp"
+#include "identify/fit.hpp"
+#include "identify/problem.hpp"
+#include "identify/refusals.hpp"
+#include "identify/report.hpp"
+#include "tests/identify/bench.hpp"
+#include "tests/identify/hidden_log.hpp"
+#include "tests/identify/program.hpp"
+#include "tests/identify/says.hpp"
+#include "tests/slow_build.hpp"
+
+namespace {
+
+using tests::Outcome;
+using tests::run;
+using tests::says;
+
+/// A good log whose rows `edit` spoils: (time, current, speed, housing, ambient, winding or empty).
+std::string spoilt(const std::function<bool(std::vector<std::string>&, int)>& edit, tests::BenchOptions options = {}) {
+  options.core_every_s = 20;
+  options.seconds = 900;
+  const std::string path = tests::write_bench_log("hotcore_spoilt.csv", options);
+  std::ifstream in(path);
+  std::string line, out;
+  std::getline(in, line);
+  out = line + "\n";
+  for (int row = 0; std::getline(in, line); ++row) {
+    std::vector<std::string> cells;
+    std::istringstream text(line + ",");
+    for (std::string cell; std::getline(text, cell, ',');) cells.push_back(cell);
+    if (!edit(cells, row)) continue;
+    for (std::size_t i = 0; i < cells.size(); ++i) out += (i > 0 ? "," : "") + cells[i];
+    out += "\n";
+  }
+  in.close();
+  std::ofstream(path) << out;
+  return path;
+}
+
+/// What the program says of it: exit 3 with one sentence, or the verdict insufficient; never a name.
+void refused(const std::string& path, const std::string& because) {
+  const Outcome r = run(path + " --motor ec-16-40w");
+  EXPECT_TRUE(r.code == 3 || r.out.find("Verdict: insufficient") != std::string::npos) << r.out;
+  EXPECT_EQ(r.out.find("behaves"), std::string::npos) << r.out;
+  says(r.out, because);
+}
+
+TEST(BadInput, AGoodLogIsAnsweredUntilItIsSpoilt) {
+  const Outcome r = run(spoilt([](auto&, int) { return true; }) + " --motor ec-16-40w");
+  EXPECT_EQ(r.code, 0);
+  says(r.out, "Verdict: adequate");
+}
+
+TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
+  std::string housing, core;
+  const Outcome r = run(spoilt([&](auto& row, int i) {
+                          if (i > 0 && i % 10 == 1) housing = row[3];
+                          if (i > 0 && !row[5].empty()) core = row[5];
+                          if (i > 0) row[3] = housing, row[5] = core;
+                          return true;
+                        }) +
+                        " --motor ec-16-40w");
+  says(r.out, "Verdict: adequate");
+  says(r.out, "housing_degC was filled in by repeating between readings about 1 s apart");
+}
+
+TEST(BadInput, ALoadThatNeverChanges) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto as_it_is = [](auto&, int) { return true; };
+  tests::BenchOptions options;
+  options.current_A = [](double, std::mt19937_64&) { return 2.0; };
+  refused(spoilt(as_it_is, options), "The load never changes");
+  options.current_A = [](double t, std::mt19937_64&) { return t < 120 ? 0.0 : 2.0; };
+  const Outcome rests = run(spoilt(as_it_is, options) + " --motor ec-16-40w");
+  EXPECT_EQ(rests.out.find("The load never changes"), std::string::npos) << rests.out;
+}
+
+TEST(BadInput, NoTemperatureBeforeWhatIsHeldOut) {
+  const std::string path = spoilt([](auto& row, int i) {
+    row[4] = "";  // no ambient: the first reading would be taken for it
+    row[3] = i < 8000 ? "" : std::to_string(30 + 0.01 * (i - 8000));
+    return row[5] = "", true;
+  });
+  const Outcome r = run(path + " --motor ec-16-40w --hold-out 0.25");
+  EXPECT_EQ(r.code, 3);
+  says(r.out, "no temperature is read in its 675 s; hold out less");
+}
+
+TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  // A housing of twenty minutes over five: a third mass was named of a sensor that feels the winding.
+  tests::HiddenLogOptions o;
+  o.core = tests::Core::none;
+  o.seed = 3;
+  o.seconds = 300;
+  o.effects = {"sensor_placement"};
+  const std::string path = (std::filesystem::temp_directory_path() / "hotcore_five_minutes.csv").string();
+  tests::make_hidden_log(o, path);
+  const Outcome r = run(path);
+  says(r.out, "does not come near where it settles");
+}
+
+TEST(BadInput, NothingThatVaries) {
+  refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "The temperatures move by 0.0 K");
+}
+
+TEST(BadInput, ShorterThanTheHousingsTimeConstant) {
+  refused(spoilt([](auto&, int row) { return row < 1200; }), "less than the housing's time constant");
+}
+
+TEST(BadInput, TimeInMilliseconds) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto in_ms = [](auto& row, int number) { return row[0] = std::to_string(number * 100), true; };
+  refused(spoilt(in_ms), "check the units of current and time");
+  const Outcome without_sheet = run(spoilt(in_ms));
+  says(without_sheet.out, "--column time_s=COLUMN:ms");
+}
+
+TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
+  const Outcome r =
+      run(spoilt([](auto& row, int number) { return row[0] = std::to_string(number * 100), true; }, options));
+  says(r.out, "Verdict: insufficient");
+  says(r.out, "--column time_s=COLUMN:ms");
+}
+
+TEST(BadInput, TimeInMinutes) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
+  const Outcome r = run(spoilt(in_min) + " --explain");
+  says(r.out, "Verdict: insufficient");
+  says(r.out, "--column time_s=COLUMN:min");
+  says(r.out, "The two-resistor model was fitted; what it leaves is");
+}
+
+TEST(BadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.motor = {0.75, 0.00393, 1.0, 8, 0.6, 0.9};
+  options.white_K = 0.05;
+  options.step_K = 0.01;
+  double mass_degC = options.ambient_degC;
+  options.extra_housing_W = [&](double, double, double housing_degC) {
+    const double to_mass_W = (housing_degC - mass_degC) / 2;
+    mass_degC += 0.005 * to_mass_W / 30;  // four times in a step of 20 ms
+    return -to_mass_W;
+  };
+  const identify::Report report = identify::discover(tests::bench_logs({options}), std::nullopt);
+  EXPECT_EQ(report.sentence.find("as that of no motor does"), std::string::npos) << report.sentence;
+}
+
+TEST(BadInput, TheSheetOfAnotherMotor) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto as_it_is = [](auto&, int) { return true; };
+  const Outcome near = run(spoilt(as_it_is) + " --motor ec-powermax-30-48v");
+  says(near.out, "times the sheet's; see whether maxon EC-powermax 30");
+  tests::BenchOptions insulated;
+  insulated.motor.R1 = 45;
+  insulated.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 200) < 100 ? 1.2 : 0.3; };
+  refused(spoilt(as_it_is, insulated), "30 times off the sheet");
+}
+
+TEST(BadInput, APauseInWhichTheMotorRanOn) {
+  const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
+  const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");
+  says(r.out, "Verdict: adequate");
+  says(r.out, "Nothing tells the heat input for 60 s from 400 s");
+}
+
+TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.core_every_s = 2;
+  options.seconds = 3600;
+  const auto rows = [&](int apart) {
+    return run(spoilt([&](auto&, int row) { return row % apart == 0; }, options) + " --motor ec-16-40w").out;
+  };
+  says(rows(1), "Verdict: adequate");
+  says(rows(20), "between rows 2 s apart");
+}
+
+TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
+  tests::BenchOptions options;
+  options.rate_Hz = 0.5;
+  options.seconds = 1800;
+  options.slow_K = 0;
+  options.current_A = [](double t, std::mt19937_64&) { return 1.2 + 0.8 * std::sin(t / 40); };
+  const auto motor = tests::ec_16();
+  const auto refusal = [&] {
+    const auto logs = tests::bench_logs({options});
+    const auto problem = identify::problem_of(logs, motor);
+    identify::Search found;
+    found.verdict = identify::Verdict::unknown_cause;
+    found.base.fit = found.chosen.fit = identify::fit(problem, {});
+    return identify::too_sparse(problem, found, logs);
+  };
+  EXPECT_EQ(refusal(), "");
+  options.extra_housing_W = [](double t, double, double) { return 0.02 * std::sin(t / 90); };
+  EXPECT_NE(refusal(), "") << "what is left is no more than the load between rows may do";
+}
+
+TEST(BadInput, FortyPercentMissing) {
+  std::mt19937 random(4);
+  refused(spoilt([&](auto&, int) { return random() % 10 >= 4; }), "40 % of the readings or rows are missing");
+  refused(spoilt([&](auto& row, int) { return row[3] = random() % 10 < 4 ? "" : row[3], true; }),
+          "40 % of the readings or rows are missing");
+}
+
+TEST(BadInput, ATemperatureReadEightTimes) {
+  refused(spoilt([](auto& row, int number) {
+            if (number % 1200 != 0) row[3] = "";
+            return row[5] = "", true;
+          }),
+          "8 readings of a temperature are too few");
+}
+
+TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const Outcome r = run(spoilt([](auto& row, int) { return row[2] = "", true; }) + " --motor ec-16-40w --explain");
+  EXPECT_EQ(r.code, 0);
+  says(r.out, "Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, ");
+  const Outcome stands =
+      run(spoilt([](auto& row, int) { return row[2] = "0", true; }) + " --motor ec-16-40w --explain");
+  says(stands.out, "speed_rad_per_s never moves (");
+}
+
+TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions options;
+  options.power_gain = 1;
+  auto logs = tests::bench_logs({options});
+  auto& speed = logs[0].of(identify::Role::speed);
+  for (std::size_t i = 0; i < speed.size(); ++i) speed[i] = i / 500 % 2 == 0 ? 100 : 0;
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  std::string said;
+  for (const auto& lines : {report.notes, report.reasoning})
+    for (const std::string& line : lines) said += line + "\n";
+  EXPECT_EQ(said.find("never moves"), std::string::npos) << said;
+  says(said, "power_W tells no current (ac_copper_loss, ");
+}
+
+std::string fahrenheit(const std::string& degC) {
+  return degC.empty() ? "" : std::to_string(std::stod(degC) * 1.8 + 32);
+}
+
+TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), true; }),
+          "--column housing_degC=COLUMN:degF");
+  refused(spoilt([](auto& row, int) { return row[5] = fahrenheit(row[5]), true; }), "--column core_degC=COLUMN:degF");
+  refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), row[5] = fahrenheit(row[5]), true; }),
+          "--column housing_degC=COLUMN:degF --column core_degC=COLUMN:degF");
+}
+
+TEST(BadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  double sensor_degC = NAN;
+  refused(spoilt([&](auto& row, int) {
+            const double housing_degC = std::stod(row[3]);
+            if (std::isnan(sensor_degC)) sensor_degC = housing_degC;
+            sensor_degC += (housing_degC - sensor_degC) * (0.1 / 40);  // a sensor of 40 s, a row every 0.1 s
+            row[3] = std::to_string(sensor_degC);
+            row[5] = fahrenheit(row[5]);
+            return true;
+          }),
+          "--column core_degC=COLUMN:degF");
+}
+
+TEST(BadInput, CurrentAndSpeedSwapped) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  refused(spoilt([](auto& row, int number) {
+            row[2] = row[1];
+            row[1] = number / 300 % 2 == 0 ? "0" : "2.5";
+            return true;
+          }),
+          "follow the square of the speed column and not that of the current: the two columns are swapped");
+}
+
+TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLog) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto speed_rad_per_s = [](double t) { return std::fmod(t, 200) < 100 ? 2 : 0.5; };
+  tests::BenchOptions options;
+  options.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 130) < 60 ? 0.4 : 0.1; };
+  options.extra_housing_W = [&](double t, double, double) { return std::pow(speed_rad_per_s(t), 2); };
+  auto logs = tests::bench_logs({options});
+  for (std::size_t i = 0; i < logs[0].of(identify::Role::time).size(); ++i)
+    logs[0].of(identify::Role::speed)[i] = speed_rad_per_s(logs[0].of(identify::Role::time)[i]);
+  const auto problem = identify::problem_of(logs, std::nullopt);
+  const auto fitted = [&](const char* id) {
+    identify::Candidate out;
+    out.fit = identify::fit(problem, {{identify::cause_named(id)}});
+    return out;
+  };
+  identify::Search found;
+  found.verdict = identify::Verdict::explained;
+  found.two_resistors = found.base.fit = identify::fit(problem, {});
+  found.singles = {fitted("sensor_offset")};
+  found.chosen = found.singles.front();
+  EXPECT_NE(identify::suspicion(problem, found, logs, std::nullopt).find("the two columns are swapped"),
+            std::string::npos);
+  found.chosen = fitted("speed_loss_quadratic");
+  EXPECT_EQ(identify::suspicion(problem, found, logs, std::nullopt), "");
+}
+
+}  // namespace
