@@ -69,7 +69,11 @@ void Axis::restore(const AxisMemory& memory) {
   core_.restore(memory.heat, -1.0);
   const wire::Fault fault = memory.fault.fault;
   const bool judged_anew = fault == wire::Fault::parameters || fault == wire::Fault::clock_lost;
-  if (fault != wire::Fault::none && !judged_anew) hold(memory.fault);
+  if (fault == wire::Fault::none || judged_anew) return;
+  if (mode_ == Mode::tripped)
+    behind_ = memory.fault;
+  else
+    hold(memory.fault);
 }
 
 /// A board or a heat set that cannot be is refused with id 0; a heat set without nodes is one that was never given.
@@ -111,10 +115,7 @@ void Axis::take_over() {
   flux_Wb_ = p.flux_linkage_Wb;
   pwm_Hz_ = rating_.pwm_Hz;
   period_s_ = 1.0f / rating_.pwm_Hz;
-  if (fault_.fault == wire::Fault::parameters) {
-    fault_ = {};
-    change(Event::clear);
-  }
+  if (fault_.fault == wire::Fault::parameters) cleared();
 }
 
 // ---- fast lane ------------------------------------------------------------------------------------------------------
@@ -122,7 +123,7 @@ void Axis::take_over() {
 hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   if (commands_.load(std::memory_order_relaxed) != 0) obey();
   const Sight sight = guard_.admits(sample);
-  if (sight.verdict != Verdict::fresh) return unseen(sight.verdict);
+  if (sight.verdict != Verdict::fresh) return unseen(sample, sight.verdict);
 
   const Abc phase_A = offsets_.correct(sample.current_A);
   const RotorAngle rotor = rotor_.follow(sample.rotor_rad, sight.periods);
@@ -167,9 +168,18 @@ void Axis::add_missed(HeatSums& sums, std::uint32_t missed) {
   sums.periods += missed;
 }
 
-/// No sample to work with: one period goes on as it was, the second trips if the bridge could be on.
-hal::Duty Axis::unseen(Verdict verdict) {
+/// No sample to work with: one period goes on as it was, the second trips if the bridge could be on. Current may flow
+/// through the diodes all the same: what can be read of it heats, and of what cannot the last, hotter.
+hal::Duty Axis::unseen(const hal::AxisSample& sample, Verdict verdict) {
   sees_ = false;
+  if (verdict == Verdict::refused) {
+    const Abc phase_A = offsets_.correct(sample.current_A);
+    HeatSums& sums = heat_.adding();
+    if (std::isfinite(phase_A.a) && std::isfinite(phase_A.b) && std::isfinite(phase_A.c))
+      add_heat(sums, phase_A, 1);
+    else
+      add_missed(sums, 1);
+  }
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
   if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) return last_;
@@ -210,6 +220,13 @@ hal::Duty Axis::trip(const FaultRecord& found) {
   return last_ = released;
 }
 
+/// What was latched behind it, by an earlier start, is next.
+void Axis::cleared() {
+  fault_ = behind_;
+  behind_ = {};
+  if (fault_.fault == wire::Fault::none) change(Event::clear);
+}
+
 // ---- commands -------------------------------------------------------------------------------------------------------
 
 wire::Status Axis::against_arming() const {
@@ -245,8 +262,7 @@ void Axis::obey() {
   if (asked_for(Command::configure)) take_over();
   if (asked_for(Command::disarm)) change(Event::disarm);
   if (asked_for(Command::clear) && setpoint_.is_zero() && fault_.fault != wire::Fault::parameters) {
-    if (mode_ == Mode::tripped) fault_ = {};
-    change(Event::clear);
+    if (mode_ == Mode::tripped) cleared();
   }
   if (asked_for(Command::arm) && mode_ == Mode::off && against_arming() == wire::Status::done) {
     setpoint_.discard();
@@ -290,8 +306,11 @@ FaultRecord Axis::fault() const {
 void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) {
   const HeatSums sums = heat_.take();
   input_ = heat_input(sums);
-  const int steps = static_cast<int>(static_cast<float>(sums.periods) * period_s_ * slow_Hz + 0.5f);
-  core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps - 1);
+  // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
+  owed_steps_ += static_cast<float>(sums.periods) * period_s_ * slow_Hz;
+  steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
+  owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
+  core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps_ - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();

@@ -99,7 +99,7 @@ class Axis {
   bool at_rest() const;
 
   /// What must survive a reset, as of the last slow tick.
-  AxisMemory memory() const { return {core_.save(), fault()}; }
+  AxisMemory memory() const { return {core_.save(), behind_.fault != wire::Fault::none ? behind_ : fault()}; }
   /// Before the control interrupt runs. Time in reset is unknown: nothing has cooled. A fault stays latched.
   void restore(const AxisMemory& memory);
   /// The same without a memory: hot until something proves otherwise.
@@ -159,8 +159,9 @@ class Axis {
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
   const thermal::CoreEstimator& core() const { return core_; }
-  /// Mean of |i|^2 over the last slow tick, ripple included: what heats the power stage.
+  /// Mean of |i|^2 over the last slow tick, ripple included: what heats the power stage; for how many steps of 10 ms.
   double current2_A2() const { return input_[thermal::Drive::current_A2]; }
+  int elapsed_steps() const { return steps_; }
 
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
@@ -171,9 +172,10 @@ class Axis {
   void judge(const AxisSetup& setup);
   void take_over();
   [[gnu::noinline]] void obey();
-  [[gnu::noinline]] hal::Duty unseen(Verdict verdict);
+  [[gnu::noinline]] hal::Duty unseen(const hal::AxisSample& sample, Verdict verdict);
   [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
+  void cleared();
   void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
   thermal::HeatInput<> heat_input(const HeatSums& sums);
@@ -239,6 +241,8 @@ class Axis {
   thermal::Governor governor_;
   thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
+  float owed_steps_ = 0.0f;       // time that is not yet a whole one
+  int steps_ = 1;                 // that the last slow tick stood for
   float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
   float blind_cap_A_;       // and what it leaves now
@@ -247,7 +251,7 @@ class Axis {
   // Outward.
   std::uint32_t tripped_periods_ = 0;
   float period_s_ = 0.0f;
-  FaultRecord fault_;
+  FaultRecord fault_, behind_;  // the latter latched before a start that found another
   float housing_measured_degC_ = unset;
   AxisState state_;
   std::uint8_t index_;

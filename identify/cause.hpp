@@ -21,6 +21,7 @@ enum class Edit {
   cooling_step,    // parameters: factor of the sink conductance, and when
   cooling_of_log,  // parameter 0: factor of the sink conductance throughout one of several logs
   power_of_log,    // parameter 0: factor of the recorded power that heats, likewise
+  current_of_log,  // parameter 0: factor of the recorded current, likewise
   current_offset,
   sensor_lag,
   winding_lag,
@@ -57,7 +58,19 @@ struct Parameter {
   double none = 0;  // where the prior is centred: what does nothing, or, of what always does something, the usual
 };
 
-enum class Needs { nothing, current, speed, neighbour, frame, several_currents, several_logs, several_powers, copper, winding };
+enum class Needs {
+  nothing,
+  current,
+  speed,
+  neighbour,
+  frame,
+  several_currents,
+  several_logs,
+  logs_of_power,
+  logs_of_current,
+  copper,
+  winding
+};
 
 struct Cause {
   const char* id;
@@ -81,7 +94,7 @@ int cause_named(const std::string& id);
 
 /// The cause is of one log among several, and may be chosen for each of them.
 inline bool of_one_log(const Cause& cause) {
-  return cause.edit == Edit::cooling_of_log || cause.edit == Edit::power_of_log;
+  return cause.edit == Edit::cooling_of_log || cause.edit == Edit::power_of_log || cause.edit == Edit::current_of_log;
 }
 
 /// A cause chosen for a fit; `log` only for causes of one log, -1 otherwise.
@@ -160,6 +173,15 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
     case Edit::power_of_log:
       for (int s = 0; here && s < set.source_count; ++s) {
         if (set.sources[s].drive == thermal::Drive::power_W) set.sources[s].gain = set.sources[s].gain * k[0];
+      }
+      break;
+    case Edit::current_of_log:
+      for (int s = 0; here && s < set.source_count; ++s) {
+        auto& source = set.sources[s];
+        if (thermal::is_current_square(source.drive) || source.drive == thermal::Drive::current2_speed2)
+          source.gain = source.gain * k[0] * k[0];
+        else if (source.drive == thermal::Drive::current_A || source.drive == thermal::Drive::current_speed)
+          source.gain = source.gain * k[0];
       }
       break;
     case Edit::current_offset:

@@ -79,6 +79,23 @@ void place_sensor(const Model<double>& m, double share, thermal::HeatSet<double>
   set.housing.node = way.to;
 }
 
+/// How much of the motor's rise over its sink is put down to a drift of that, which no board is told of: it may as well
+/// be a motor that cools worse.
+double drifted_share(const Problem& problem, const Fit& f) {
+  const int at = coordinate_of(f, Edit::drift);
+  if (at < 0) return 0;
+  double most = 0;
+  for (const Bins& log : problem.logs) {
+    double rise_K = 0;
+    for (const Bin& bin : log.bins) {
+      for (const double read_degC : {bin.housing_degC, bin.core_degC})
+        rise_K = std::fmax(rise_K, read_degC - bin.input[thermal::Boundary::ambient]);
+    }
+    most = std::max(most, std::abs(f.x[at]) * log.duration_s() / std::max(rise_K, 1.0));
+  }
+  return most;
+}
+
 }  // namespace
 
 thermal::HeatSet<double> heat_set_of(const Problem& problem, const Fit& f) {
@@ -114,7 +131,8 @@ thermal::Trust trust_of(const Problem& problem, const Fit& f, const thermal::Tru
   const auto share = [](double sd) { return static_cast<float>(std::min(sd, 0.5)); };
   // More power is less capacity.
   const double correlation = -together(power, unit(resistance)) / (power_sd * resistance_sd);
-  return {share(power_sd), share(resistance_sd), share(deviation(unit(1), least.cooling)),
+  const double cooling_sd = std::max(deviation(unit(1), least.cooling), drifted_share(problem, f));
+  return {share(power_sd), share(resistance_sd), share(cooling_sd),
           static_cast<float>(std::clamp(correlation, -1.0, 1.0))};
 }
 

@@ -368,8 +368,10 @@ bool Problem::possible(const Cause& cause) const {
       return any([](const Bins& b) { return b.has_frame; });
     case Needs::several_logs:
       return logs.size() > 1;
-    case Needs::several_powers:
+    case Needs::logs_of_power:
       return logs.size() > 1 && heated_by_power();
+    case Needs::logs_of_current:
+      return logs.size() > 1 && amps;
   }
   return true;
 }

@@ -72,6 +72,16 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
                                             : "");
   }
   if (!problem.belief.known) return "";
+  // Where something else is wrong, what heats slowly may pass for a winding: masses change places. Windings shipped are
+  // within a factor of two of their sheet.
+  constexpr double much = 5;
+  const ParameterLine C1 = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()))[2];
+  if (!found.chosen.fit.chosen.empty() && C1.determined && C1.value > much * problem.belief.C1_J_per_K)
+    return fmt::format(
+        "Beside {} the winding would take up {:.3g} J/K, {:.2g} times its sheet: another mass stands in its place. "
+        "Read the winding{}, or see whether {} is this motor.",
+        fmt::join(names_of(found.chosen.fit.chosen), " and "), C1.value, C1.value / problem.belief.C1_J_per_K,
+        problem.any_core() ? " more often" : " (core_degC or winding_ohm)", problem.belief.motor);
   const auto lines = base_lines(problem, found.chosen.fit, 1);
   const Physical p = physical(found.chosen.fit.x);
   const bool off[] = {true, p.R2_K_per_W > problem.belief.R2_K_per_W, true, p.C2_J_per_K < problem.belief.C2_J_per_K};

@@ -338,16 +338,17 @@ void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
 
 /// The first parameter of the causes that its bound holds against evidence worth more than `tie`; empty when none does.
 /// What lies at a bound, or near it, is held there by noise half of the time. Nothing at all may well be true, and of a
-/// share all. A capacity or a resistance at its bound is no part of a motor, whatever the evidence: a hot spot that is
-/// heavier than any winding stands for another law.
+/// share all. A part of a winding at the bound of its capacity is none, whatever the evidence: as heavy as twenty
+/// windings it stands for another law.
 std::string held_by_a_bound(const Fit& f, double tie) {
   const Eigen::MatrixXd covariance = f.covariance(false);
   Eigen::Index at = base_count;
   for (const Chosen& chosen : f.chosen) {
     for (const Parameter& p : cause_of(chosen).parameters) {
       const bool all = cause_of(chosen).edit == Edit::sensor_share, none = p.low == 0 && !(f.x[at] > 0);
+      const bool too_heavy = p.scale == Scale::core_capacity && f.x[at] > 0;
       const double gain = f.gradient[at] * f.gradient[at] * covariance(at, at);  // of a parabola, were the bound let go
-      if (f.at_bound[static_cast<std::size_t>(at++)] && !all && !none && (p.logarithmic || gain > tie)) return p.name;
+      if (f.at_bound[static_cast<std::size_t>(at++)] && !all && !none && (too_heavy || gain > tie)) return p.name;
     }
   }
   return "";

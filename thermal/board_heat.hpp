@@ -29,12 +29,13 @@ class BoardHeat {
         limit_A2_(rating.continuous_A * rating.continuous_A),
         share_(static_cast<double>(1.0f / (1.0f + rating.tau_s / static_cast<float>(estimator_dt_s)))) {}
 
-  /// One step of 10 ms with both axes' mean |i|^2 (not finite or negative: what would heat to the limit at once). The
-  /// power stage's sensor may only raise the model.
-  void tick(double axis0_A2, double axis1_A2, Reading power_stage = {0.0f, false}) {
+  /// `steps` of 10 ms with both axes' mean |i|^2 (not finite or negative: what would heat to the limit at once; and so
+  /// does time without end). The power stage's sensor may only raise the model.
+  void tick(double axis0_A2, double axis1_A2, Reading power_stage = {0.0f, false}, int steps = 1) {
     const double load_A2 = axis0_A2 + axis1_A2;
-    const bool good = axis0_A2 >= 0.0 && axis1_A2 >= 0.0 && load_A2 < 1e12;
-    used_A2_ += good ? (load_A2 - used_A2_) * share_ : static_cast<double>(limit_A2_);
+    const bool good = axis0_A2 >= 0.0 && axis1_A2 >= 0.0 && load_A2 < 1e12 && steps <= 200;
+    if (!good) used_A2_ += static_cast<double>(limit_A2_);
+    for (int i = 0; good && i < steps; ++i) used_A2_ += (load_A2 - used_A2_) * share_;
     if (power_stage.valid && power_stage.value > rating_.idle_degC) {
       const float seen = (power_stage.value - rating_.idle_degC) / (rating_.limit_degC - rating_.idle_degC) * limit_A2_;
       if (used_A2_ < static_cast<double>(seen)) used_A2_ = static_cast<double>(seen);

@@ -16,8 +16,10 @@ constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
 // A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
 constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
 
-constexpr int window_steps = 50;     // the housing is heard twice a second: faster only averages its noise
-constexpr int missing_steps = 10;    // 100 ms without a reading: safety table, NTC open or short
+constexpr int window_steps = 50;        // the housing is heard twice a second: faster only averages its noise
+constexpr int missing_steps = 10;       // 100 ms without a reading: safety table, NTC open or short
+constexpr int slow_window_steps = 200;  // a sensor that needs longer to fill a window is no better than none: chosen
+constexpr int most_lost_steps = 200;    // 2 s: no watchdog waits longer
 constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
 constexpr float suspicious_pull_K = 1.0f;  // lowered by less, a stuck sensor does little harm: chosen
 constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
@@ -25,8 +27,10 @@ constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in
 constexpr float unheard_sigma_K = 3.0f;  // that housing and ambient are less known by, once nothing tells them; chosen
 constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;  // as slowly as an ambient drifts (below)
 constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
-constexpr float enough_movement_K = 3.0f, alive_share = 0.5f, stuck_share = 0.25f;
-constexpr float start_sigma_K = 15.0f;
+// Of what the model expects: a sensor that comes off by half is not alive. Above 0.7 honest sensors fail as well, on
+// motors that their sheet does not fit (at 0.9 these lose a tenth of their A^2 s, at 0.7 a hundredth).
+constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
+constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
 constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
@@ -38,10 +42,6 @@ constexpr float ambient_walk_K2_per_s = 100.0f / 1200.0f, ambient_worst_K = 10.0
 float squared(float x) { return x * x; }
 
 bool plausible(double degC) { return degC > coldest_degC && degC < hottest_possible_degC; }  // false for NaN
-
-constexpr bool is_current_square(int drive) {
-  return drive >= static_cast<int>(Drive::phase_a_A2) && drive <= static_cast<int>(Drive::current_A2);
-}
 
 }  // namespace
 
@@ -106,7 +106,8 @@ const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, R
   flags_ &= ~(input_replaced | lost_time | state_restored);
   if (lost_steps > 0) {
     flags_ |= lost_time;
-    for (int i = 0; i < lost_steps && i < 200; ++i) step();
+    for (int i = 0; i < lost_steps && i < most_lost_steps; ++i) step();
+    if (lost_steps > most_lost_steps) raise_to(static_cast<float>(hottest_limit_degC()) - unknown_below_K);
   }
   if (!take_input(input)) flags_ |= input_replaced;
   ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
@@ -130,8 +131,9 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
     }
     good = false;
     input_.drive[i] *= 1.1;
-    const double full_scale = is_current_square(i) ? static_cast<double>(settings_.full_scale_A2) : 1e4;
-    if (is_current_square(i) || !(input_.drive[i] < full_scale)) input_.drive[i] = full_scale;
+    const bool square = is_current_square(static_cast<Drive>(i));
+    const double full_scale = square ? static_cast<double>(settings_.full_scale_A2) : 1e4;
+    if (square || !(input_.drive[i] < full_scale)) input_.drive[i] = full_scale;
   }
   input_[Drive::one] = 1.0;  // constant heat does not wait to be reported
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) {
@@ -200,30 +202,31 @@ void CoreEstimator::hear_housing(Reading housing) {
   pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
 
   const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
-  if (!usable) {
-    if (silent_ < missing_steps) ++silent_;
-    if (silent_ == missing_steps && !(flags_ & housing_missing)) {
-      flags_ |= housing_missing;
-      p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
-      p_(ambient(), ambient()) += squared(unheard_sigma_K);
-    }
-    window_ = heard_ = 0;
-    reading_sum_ = sensor_sum_ = 0.0;
-    return;
+  if (unheard_ < slow_window_steps) ++unheard_;
+  if (!usable && silent_ < missing_steps) ++silent_;
+  if (usable) silent_ = 0;
+  if ((silent_ == missing_steps || unheard_ == slow_window_steps) && !(flags_ & housing_missing)) {
+    flags_ |= housing_missing;
+    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
+    p_(ambient(), ambient()) += squared(unheard_sigma_K);
   }
-  silent_ = 0;
-  flags_ &= ~static_cast<std::uint32_t>(housing_missing);
-  ++heard_;
+  if (silent_ == missing_steps) {
+    window_ = 0;
+    reading_sum_ = sensor_sum_ = 0.0;
+  }
+  if (!usable) return;
   reading_sum_ += static_cast<double>(housing.value);
   sensor_sum_ += sensor_degC_ + static_cast<double>(due_K_[sensor()]);  // as if it had all flowed in
   if (++window_ < window_steps) return;
 
-  const float reading_degC = static_cast<float>(reading_sum_ / heard_);
-  const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / heard_);
-  window_ = heard_ = 0;
+  const float reading_degC = static_cast<float>(reading_sum_ / window_);
+  const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / window_);
+  if (unheard_ < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
+  window_ = unheard_ = 0;
   reading_sum_ = sensor_sum_ = 0.0;
+  if (!read_) reading_slow_degC_ = reading_degC;
+  read_ = true;
   if (!acquired_) {
-    reading_slow_degC_ = reading_degC;
     // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
     if (!ambient_known_ && static_cast<double>(reading_degC) < ambient_degC_) {
       ambient_degC_ = static_cast<double>(reading_degC > 20.0f ? reading_degC : 20.0f);
@@ -372,7 +375,7 @@ void CoreEstimator::raise_to(float winding_degC) {
 }
 
 HeatMemory CoreEstimator::save() const {
-  HeatMemory memory{n_, {}, {}, static_cast<float>(ambient_degC_)};
+  HeatMemory memory{n_, {}, {}, static_cast<float>(ambient_degC_), flags_ & housing_contradicts ? 1u : 0u};
   for (int i = 0; i < n_; ++i) {
     memory.degC[i] = static_cast<float>(degC_[i]);
     memory.sigma_K[i] = std::sqrt(p_(i, i));
@@ -393,7 +396,7 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
     const double limit = std::isfinite(max_degC_[i]) ? static_cast<double>(max_degC_[i]) : hottest;
     rise[i] = (plausible(saved) ? saved : limit) - ambient_degC_;
     if (!(rise[i] > 0.0)) rise[i] = 0.0;
-    sigma_K[i] = memory.sigma_K[i] >= 0.0f && memory.sigma_K[i] < 100.0f ? memory.sigma_K[i] : start_sigma_K;
+    sigma_K[i] = memory.sigma_K[i] >= 0.0f ? std::fmin(memory.sigma_K[i], most_sigma_K) : start_sigma_K;
   }
   if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
   degC_ = rise.array() + ambient_degC_;
@@ -409,6 +412,11 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   begin_anew(sigma_K);
   if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+  if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
+    flags_ |= housing_contradicts;
+    acquired_ = true;
+    trusted_ambient_degC_ = ambient_degC_;
+  }
   publish();
 }
 
@@ -438,7 +446,8 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  acquired_ = false;
+  acquired_ = read_ = false;
+  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
   due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = 0.0f;
@@ -457,7 +466,8 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   publish();
 }
 
-/// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call.
+/// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What
+/// has a limit and was not too cold may have been as hot as it seemed: it is at its limit at least.
 void CoreEstimator::guard_state() {
   bool good = plausible(ambient_degC_) && plausible(sensor_degC_);
   for (int i = 0; i < n_; ++i) good = good && plausible(degC_[i]);
@@ -472,7 +482,8 @@ void CoreEstimator::guard_state() {
   flags_ |= state_restored;
   for (int i = 0; i < n_; ++i) {
     const double last = plausible(good_degC_[i]) ? good_degC_[i] : hottest_possible_degC - 100.0;
-    degC_[i] = last + static_cast<double>(restored_hotter_K);
+    const double limit = static_cast<double>(max_degC_[i]), hotter = last + static_cast<double>(restored_hotter_K);
+    degC_[i] = !(degC_[i] <= coldest_degC) && std::isfinite(limit) && limit > hotter ? limit : hotter;
   }
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
   sensor_degC_ = degC_[housing_.node];

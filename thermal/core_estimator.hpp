@@ -48,7 +48,7 @@ struct EstimatorSettings {
 };
 
 enum EstimateFlag : std::uint32_t {
-  housing_missing = 1u << 0,      // no usable reading for 100 ms
+  housing_missing = 1u << 0,      // no usable reading for 100 ms, or not half a second of them within two
   housing_contradicts = 1u << 1,  // colder than the model can believe: ignored until it agrees again
   input_replaced = 1u << 2,       // a drive was not finite or negative: something hotter was taken
   lost_time = 1u << 3,            // this call stood for more than one step
@@ -74,6 +74,7 @@ struct HeatMemory {
   std::int32_t node_count;
   float degC[max_nodes], sigma_K[max_nodes];
   float ambient_degC;
+  std::uint32_t disbelieved = 0;  // 1: the housing sensor was, and is until it agrees again
 };
 
 class CoreEstimator {
@@ -84,7 +85,8 @@ class CoreEstimator {
   /// housing reading moves all of it. After a reset call restore() instead of trusting that.
   CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings);
 
-  /// One step of 10 ms. `lost_steps` (at most 200 a call; call again for more) are charged before it at the last input.
+  /// One step of 10 ms. `lost_steps` are charged before it at the last input. After more than 200 of them nothing is
+  /// known of a winding: it is 10 K below its limit, or hotter.
   /// input[Boundary::ambient] is not used: give `ambient` when it is measured.
   const Estimate& tick(const HeatInput<>& input, Reading housing, Reading ambient = {0.0f, false}, int lost_steps = 0);
 
@@ -157,8 +159,8 @@ class CoreEstimator {
 
   // The housing sensor's record.
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;
-  int heard_ = 0, window_ = 0, silent_ = 0;
-  bool acquired_ = false, ambient_known_ = false;
+  int window_ = 0, silent_ = 0, unheard_ = 0;  // steps: of readings in it, without one, since it was last full
+  bool acquired_ = false, read_ = false, ambient_known_ = false;
   double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
   float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
   float model_moved_K_ = 0.0f;         // how far the model says the housing moved in about two minutes,

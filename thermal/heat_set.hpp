@@ -40,6 +40,7 @@ enum class Drive : std::uint8_t {
   speed_to_0_8,     // mean of |w|^0.8, for forced convection
   count
 };
+constexpr bool is_current_square(Drive drive) { return drive >= Drive::phase_a_A2 && drive <= Drive::current_A2; }
 inline constexpr int drive_count = static_cast<int>(Drive::count);
 
 enum class LinkLaw : std::uint8_t {

@@ -18,15 +18,15 @@ constexpr double value_of(T x) { return static_cast<double>(x); }
 
 enum class SetProblem : std::uint8_t {
   none,
-  bad_count,               // no node, or more nodes, links or sources than there is room for
-  bad_capacity,            // not positive and finite
-  bad_limit,               // max_degC is NaN
-  bad_link_end,            // neither a node nor a boundary, or both ends the same, or two boundaries
-  bad_conductance,         // negative or not finite
-  bad_law,                 // unknown, or its parameter is not finite
-  bad_source,              // node or drive unknown, gain or coefficient not finite
-  bad_sensor,              // its node unknown, a value not finite, lag negative, or gain error <= -1
-  unconnected_node,        // no path to a boundary: its heat could never leave
+  bad_count,         // no node, or more nodes, links or sources than there is room for
+  bad_capacity,      // not positive and finite
+  bad_limit,         // max_degC is NaN
+  bad_link_end,      // neither a node nor a boundary, or both ends the same, or two boundaries
+  bad_conductance,   // negative or not finite
+  bad_law,           // unknown, or its parameter is not finite
+  bad_source,        // node or drive unknown, gain or coefficient not finite; a current that cools, copper that cools
+  bad_sensor,        // its node unknown, a value not finite, lag negative, or gain error <= -1
+  unconnected_node,  // no path to a boundary: its heat could never leave
   time_constant_too_short  // of the node, against the step: see largest_stiffness
 };
 
@@ -101,7 +101,8 @@ SetCheck validate(const HeatSet<Scalar>& set, double dt_s) {
   for (int i = 0; i < set.source_count; ++i) {
     const Source<Scalar>& s = set.sources[i];
     if (!is_node(s.node, set.node_count) || s.drive >= Drive::count || !finite(s.gain) ||
-        !finite(s.coefficient_per_K)) {
+        !finite(s.coefficient_per_K) || (is_current_square(s.drive) && !(value_of(s.gain) >= 0.0)) ||
+        !(value_of(s.coefficient_per_K) >= 0.0)) {
       return {SetProblem::bad_source, i};
     }
   }

@@ -106,6 +106,17 @@ HeatModel read_heat_model(const std::string& path) {
                  number(path, sensor, "lag_s", 0), number(path, sensor, "offset_K", 0),
                  number(path, sensor, "gain_error", 0)};
 
+  // Enamelled wire ends with class 240 (IEC 60317-46).
+  constexpr float most_degC = 250;
+  int limited = 0;
+  for (int i = 0; i < set.node_count; ++i) {
+    const float limit_degC = set.nodes[i].max_degC;
+    limited += std::isfinite(limit_degC);
+    if (std::isfinite(limit_degC) && !(limit_degC <= most_degC))
+      refuse(fmt::format("{}: node {}: max_degC = {:g} is no limit of a winding; give {:g} or less.", path, i,
+                         limit_degC, most_degC));
+  }
+  if (limited == 0) refuse(path + ": no node has a max_degC, so nothing would be protected; give the windings theirs.");
   const thermal::SetCheck check = thermal::validate(set, thermal::estimator_dt_s);
   if (!check.ok()) {
     refuse(
@@ -114,10 +125,8 @@ HeatModel read_heat_model(const std::string& path) {
   }
 
   // A board measures no power: such a winding would stay cold whatever flows, and nothing would be limited.
-  const bool heated = std::any_of(set.sources, set.sources + set.source_count, [](const thermal::Source<double>& s) {
-    using enum thermal::Drive;
-    return s.drive == current_A2 || s.drive == phase_a_A2 || s.drive == phase_b_A2 || s.drive == phase_c_A2;
-  });
+  const bool heated = std::any_of(set.sources, set.sources + set.source_count,
+                                  [](const thermal::Source<double>& s) { return thermal::is_current_square(s.drive); });
   if (!heated)
     refuse(path + ": no current heats it, and a board measures no power; record the current and identify again.");
 

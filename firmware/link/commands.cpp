@@ -249,6 +249,10 @@ void Commands::set(const wire::Setpoints& wish, Reply& reply) {
     if (!(wish.mask >> i & 1)) continue;
     Axis& axis = driver_.axis(i);
     const bool torque = wish.mode[i] == wire::ControlMode::torque;
+    if (static_cast<int>(wish.mode[i]) >= wire::control_mode_count) {
+      refused[i] = Status::out_of_range;
+      continue;
+    }
     refused[i] = torque ? axis.set_torque(wish.id_A[i], wish.q[i]) : axis.set_current({wish.id_A[i], wish.q[i]});
   }
   wire::State now = state();

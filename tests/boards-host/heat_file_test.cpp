@@ -102,6 +102,10 @@ TEST(HeatFile, MistakesAreAnsweredWithThePlace) {
   EXPECT_NE(complaint(model_text(), "from = 0", "from = 7").find("cannot be used"), std::string::npos);
   EXPECT_NE(complaint(model_text(), "capacity_J_per_K = ", "capacity_J_per_K = -").find("cannot be used"),
             std::string::npos);
+  EXPECT_NE(complaint(model_text(), "max_degC = 155", "max_degC = 1550").find("is no limit of a winding"),
+            std::string::npos);
+  EXPECT_NE(complaint(model_text(), "max_degC = 155", "").find("nothing would be protected"), std::string::npos);
+  EXPECT_NE(complaint(model_text(), "gain = ", "gain = -").find("cannot be used"), std::string::npos);
   EXPECT_NE(complaint(model_text(), "format = 1", "format = 2").find("format must be 1"), std::string::npos);
 }
 

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -531,6 +532,45 @@ TEST_F(Running, LostTimeIsChargedHotterThanTheLastSample) {
   EXPECT_EQ(axis().mode(), Mode::running);
   // 60 of 260 periods count 1.21 times 25 A2 in every phase, which is twice the vector a real motor could have.
   EXPECT_GT(axis().current2_A2(), before_A2 * 1.1);
+}
+
+/// What an axis that is off makes of 14 s of a current that flows all the same, its slow lane called every so many
+/// periods.
+std::unique_ptr<firmware::Driver> after_current(int every, const hal::AxisSample& flowing) {
+  auto out = std::make_unique<firmware::Driver>(bench::driver_setup());
+  firmware::Driver& driver = *out;
+  std::uint32_t sequence = bench::bring_up(driver.axis(0));
+  driver.axis(0).disarm();
+  for (int i = 1; i <= 280000; ++i) {
+    hal::AxisSample sample = flowing;
+    sample.sequence = sequence++;
+    (void)driver.axis(0).tick(sample);
+    if (i % every == 0) driver.slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  }
+  return out;
+}
+
+TEST(Axis, ASlowLaneThatIsLateLosesNoTime) {
+  hal::AxisSample flowing = bench::quiet_sample(0);
+  flowing.current_A = {5, -2.5f, -2.5f};
+  const auto on_time = after_current(200, flowing);
+  for (const int every : {220, 280, 298}) {
+    const auto late = after_current(every, flowing);
+    const auto rise_K = [](const firmware::Driver& d) { return d.axis(0).core().estimate().hottest_degC() - 25; };
+    EXPECT_GT(rise_K(*late), 0.98 * rise_K(*on_time)) << every;
+    EXPECT_GT(late->board_heat().used_ratio(), 0.98f * on_time->board_heat().used_ratio()) << every;
+  }
+}
+
+TEST(Axis, WhatFlowsThroughTheDiodesBesideARefusedSampleHeats) {
+  hal::AxisSample flowing = bench::quiet_sample(0);
+  flowing.current_A = {5, -2.5f, -2.5f};
+  const double admitted_degC = after_current(200, flowing)->axis(0).core().estimate().hottest_degC();
+  hal::AxisSample over_voltage = flowing, blind = flowing;
+  over_voltage.bus_V = 60;
+  blind.valid = false;
+  for (const hal::AxisSample& sample : {over_voltage, blind})
+    EXPECT_GT(after_current(200, sample)->axis(0).core().estimate().hottest_degC(), admitted_degC - 0.5);
 }
 
 TEST(Axis, AStalledMotorIsHeldByItsCoreLimitBelowIt) {

@@ -104,4 +104,25 @@ TEST(Memory, AFaultStaysLatchedThroughAResetUntilItIsCleared) {
   EXPECT_EQ(driver.axis(1).mode(), firmware::Mode::off);
 }
 
+TEST(Memory, AFaultIsKeptBehindOneThatEachStartFindsAnew) {
+  DriverMemory memory = hot_memory();
+  memory.axes[0].fault = {wire::Fault::over_current, 0, 31.0f, 28.0f, 0.0f};
+  Driver without_clock(bench::driver_setup());
+  without_clock.axis(0).hold({wire::Fault::clock_lost});
+  without_clock.restore(memory);
+  EXPECT_EQ(without_clock.axis(0).fault().fault, wire::Fault::clock_lost);
+  Driver next(bench::driver_setup());
+  next.restore(without_clock.memory());
+  EXPECT_EQ(next.axis(0).fault().fault, wire::Fault::over_current);
+
+  std::uint32_t sequence = bench::bring_up(without_clock.axis(0));
+  (void)without_clock.axis(0).set_current({0.0f, 0.0f});
+  for (const wire::Fault left : {wire::Fault::over_current, wire::Fault::none}) {
+    ASSERT_EQ(without_clock.axis(0).clear(), wire::Status::done);
+    (void)without_clock.axis(0).tick(bench::quiet_sample(sequence++));
+    EXPECT_EQ(without_clock.axis(0).fault().fault, left);
+  }
+  EXPECT_EQ(without_clock.axis(0).mode(), firmware::Mode::off);
+}
+
 }  // namespace

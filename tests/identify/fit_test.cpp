@@ -89,7 +89,7 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
   for (std::size_t c = 0; c < identify::causes().size(); ++c) {
     const std::vector<Chosen> chosen = {{static_cast<int>(c), 0}};
     const auto& cause = identify::causes()[c];
-    const Problem& problem = cause.needs == identify::Needs::several_powers ? by_power : by_current;
+    const Problem& problem = cause.needs == identify::Needs::logs_of_power ? by_power : by_current;
     const Eigen::Index own = identify::base_count + static_cast<Eigen::Index>(cause.parameters.size()),
                        n = own + starts * identify::per_start_count;
     Eigen::VectorXd x(n), gradient;

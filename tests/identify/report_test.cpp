@@ -184,6 +184,21 @@ TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   EXPECT_EQ(identify::discover(tests::bench_logs({one, other}), tests::ec_16()).verdict, Verdict::adequate);
 }
 
+TEST(Report, ACurrentThatOneLogScalesOtherwiseIsNamed) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  tests::BenchOptions one, other;
+  for (auto* o : {&one, &other}) o->core_every_s = 2;
+  other.seed = 2;
+  std::vector<identify::Log> logs = tests::bench_logs({one, other});
+  EXPECT_EQ(identify::discover(logs, tests::ec_16()).verdict, Verdict::adequate);
+  for (double& A : logs[1].of(identify::Role::current)) A *= 0.95;
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
+  ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+  EXPECT_EQ(report.causes[0].id, "current_scale");
+  EXPECT_NEAR(std::abs(std::log(report.causes[0].parameters[0].value)), -std::log(0.95), 0.01);
+}
+
 TEST(Report, TwoResistorsAreComparedAsNearAsTheyCome) {
   tests::BenchOptions options;
   options.extra_housing_W = [mass_degC = options.ambient_degC](double, double, double housing_degC) mutable {

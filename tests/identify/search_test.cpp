@@ -743,6 +743,26 @@ TEST(ModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   says(report.model_toml, "power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n");
 }
 
+TEST(ModelFile, WhatADriftTakesOfTheRiseIsDoubtOfTheCooling) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  const auto report = report_of({.duty = tests::Duty::designed, .seed = 3, .effects = {"ambient_drift"}});
+  ASSERT_TRUE(identify::names_causes(report.verdict)) << report.sentence;
+  ASSERT_EQ(report.causes[0].id, "ambient_drift");
+  const std::string key = "\ncooling = ";
+  EXPECT_GT(std::stod(report.model_toml.substr(report.model_toml.find(key) + key.size())), 0.06) << report.model_toml;
+}
+
+TEST(Report, AWindingManyTimesItsSheetIsAnotherMassAndNoCauseIsNamedBesideIt) {
+  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+  Hidden log = hidden({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 11, .effects = {"windage"}});
+  EXPECT_TRUE(identify::names_causes(identify::discover(log.logs, log.log.sheet).verdict));
+  log.log.sheet.motor.C1_J_per_K /= 10;
+  log.log.sheet.motor.R1_K_per_W *= 10;
+  const auto report = identify::discover(log.logs, log.log.sheet);
+  EXPECT_EQ(report.verdict, Verdict::insufficient);
+  says(report.sentence, "times its sheet: another mass stands in its place. Read the winding more often");
+}
+
 TEST(Report, TwoClocksTwoMinutesApartAreToldByHowMuch) {
   if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
   Hidden log = hidden({.seed = 1});
@@ -811,7 +831,7 @@ TEST(Causes, EveryIdOfTheContractStandsInTheTable) {
         "radiation",          "cooling_change",       "third_mass",     "hot_spot",        "neighbour_heat",
         "frame_conduction",   "board_heat",           "current_offset", "sensor_lag",      "sensor_offset",
         "sensor_gain",        "ambient_drift",        "clock_delay",    "stall_imbalance", "windage",
-        "power_share",        "sensor_placement"}) {
+        "power_share",        "sensor_placement",     "current_scale"}) {
     EXPECT_GE(identify::cause_named(id), 0) << id;
   }
 }

@@ -8,6 +8,7 @@
 
 #include "tests/thermal/reference.hpp"
 #include "thermal/core_estimator.hpp"
+#include "thermal/governor.hpp"
 #include "thermal/motor_set.hpp"
 
 namespace {
@@ -256,6 +257,19 @@ TEST(Estimator, AMissingHousingIsFlaggedInATenthOfASecondAndNeverReadsAsCold) {
   }
 }
 
+TEST(Estimator, ASensorThatComesAndGoesIsHeardAndOneThatSeldomComesIsMissed) {
+  const auto after_a_minute = [](int every, bool comes) {
+    CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+    for (int i = 0; i < 6000; ++i) core.tick(current(4), (i % every == 0) == comes ? Reading{90.0f, true} : missing);
+    return core.estimate();
+  };
+  const auto always = after_a_minute(6001, false), mostly = after_a_minute(50, false), seldom = after_a_minute(9, true);
+  EXPECT_NEAR(mostly.housing_degC, always.housing_degC, 0.1) << "one of fifty is missing";
+  EXPECT_FALSE(mostly.flags & thermal::housing_missing);
+  EXPECT_TRUE(seldom.flags & thermal::housing_missing) << "eight of nine are";
+  EXPECT_GT(seldom.housing_degC, 85) << "a hot reading raises all the same";
+}
+
 TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIsFlagged) {
   for (const wire::Motor& m : {reference::ec16(), reference::powermax()}) {
     const double i2 = m.R1_K_per_W > 0.5 ? 5.0 : 110.0;
@@ -279,6 +293,24 @@ TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIs
       EXPECT_LE(worst_K, 5.0);
       EXPECT_GT(flagged_s, 0);
       EXPECT_LE(flagged_s, 120);
+    }
+  }
+}
+
+TEST(Estimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double share : {0.55, 0.6}) {
+      Bench b(reference::ec16(), with(trust), 25);
+      thermal::Governor governor({});
+      double allowed_A = 0, hottest_degC = 0;
+      for (int i = 0; i < 180000; ++i) {
+        b.run(0.01, std::pow(std::min(20.0, allowed_A), 2), [&] {
+          return Reading{static_cast<float>(25 + share * (static_cast<double>(b.honest().value) - 25)), true};
+        });
+        allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+        hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+      }
+      EXPECT_LT(hottest_degC, 155) << share;
     }
   }
 }
@@ -335,6 +367,22 @@ TEST(Estimator, AStateThatIsNotANumberComesBackHotterAndAllowsNothingMeanwhile) 
   EXPECT_TRUE(std::isfinite(next.hottest_margin_degC()));
 }
 
+TEST(Estimator, WhatLeftAllBoundsUpwardsIsAtItsLimitAtLeast) {
+  for (const int lost : {0, 150}) {
+    CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+    for (int i = 0; i < 300; ++i) core.tick(current(36), missing);
+    HeatInput<> absurd = current(50);
+    absurd[Drive::power_W] = 1e7;
+    EXPECT_GE(core.tick(absurd, missing, missing, lost).hottest_degC(), 155) << "it may have been as hot as it seemed";
+  }
+}
+
+TEST(Estimator, AfterMoreThanTwoSecondsLostNothingIsKnownOfAWinding) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  EXPECT_LT(core.tick(current(0), missing, missing, 200).hottest_degC(), 60);
+  EXPECT_NEAR(core.tick(current(0), missing, missing, 201).hottest_degC(), 145, 1);
+}
+
 TEST(Estimator, TheHostMayOnlyRaise) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   core.raise_to(90);
@@ -373,6 +421,30 @@ TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
   EXPECT_GT(core.estimate().hottest_degC(), 50.0) << "the winding itself is not seen by the housing";
   for (int i = 0; i < 1000; ++i) core.tick({}, at_25);
   EXPECT_NEAR(core.estimate().hottest_degC(), 25.0, 5.0) << "what the winding held went into the housing: 95 K C1 / C2";
+}
+
+TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAReset) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    Bench b(reference::ec16(), with(trust), 25);
+    b.run(60, 1);
+    const Reading stuck = b.honest();
+    b.run(600, 8, [&] { return stuck; });
+    ASSERT_TRUE(b.flag(thermal::housing_contradicts));
+    const double before_degC = b.core.estimate().housing_degC;
+    ASSERT_GT(before_degC, 70);
+    CoreEstimator again(thermal::three_phase_set(b.m), with(trust));
+    again.restore(b.core.save(), -1);
+    for (int i = 0; i < 500; ++i) again.tick(current(8), stuck);
+    EXPECT_GT(again.estimate().housing_degC, before_degC - 5);
+    for (int i = 0; i < 200; ++i) again.tick(current(8), {static_cast<float>(again.estimate().housing_degC), true});
+    EXPECT_FALSE(again.estimate().flags & thermal::housing_contradicts) << "until it agrees again";
+  }
+}
+
+TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  core.restore({4, {140, 140, 140, 60}, {120, 120, 120, 5}, 40}, -1);
+  EXPECT_GE(core.estimate().sigma_K[0], 100);
 }
 
 TEST(Estimator, WindingResistanceCorrectsAndAnImplausibleOneIsRefused) {

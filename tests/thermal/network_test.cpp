@@ -268,6 +268,8 @@ TEST(Validate, NamesTheFirstProblem) {
   expect(SetProblem::bad_law, 3, [](auto& s) { s.links[3].law = LinkLaw::count; });
   expect(SetProblem::bad_source, 1, [](auto& s) { s.sources[1].node = 3; });
   expect(SetProblem::bad_source, 0, [&](auto& s) { s.sources[0].gain = nan; });
+  expect(SetProblem::bad_source, 0, [](auto& s) { s.sources[0].gain = -0.5; });
+  expect(SetProblem::bad_source, 1, [](auto& s) { s.sources[1].coefficient_per_K = -0.01; });
   expect(SetProblem::bad_sensor, 0, [](auto& s) { s.housing.lag_s = -1; });
   expect(SetProblem::unconnected_node, 2, [](auto& s) {
     s.links[4].conductance_W_per_K = 0;

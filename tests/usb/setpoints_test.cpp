@@ -78,6 +78,9 @@ TEST_F(Linked, TheControlModeIsChosenByACommandAndReported) {
     EXPECT_EQ(state.axis[1].refused, number(Status::other_mode));
     program.pass(20);
   }
+  wish.mode[0] = static_cast<wire::ControlMode>(7);
+  state = program.call_for<wire::State>(Kind::setpoint, bytes_of(wish));
+  EXPECT_EQ(state.axis[0].refused, number(Status::out_of_range));
   EXPECT_EQ(axis(0).mode(), firmware::Mode::ready);
   EXPECT_EQ(axis(1).mode(), firmware::Mode::ready);
 }
