@@ -265,7 +265,11 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
   }
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   const float left_K = most_pull_K - pulled_K_;
-  correct(seen, innovation_K, noise, left_K > 0.0f ? left_K : 0.0f, window_steps);
+  // Hotter than believable counts for as much as is believable, and each further time for twice as much: a glitch of a
+  // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
+  const float believed_K = std::fmax(gate_K, hotter_K_);
+  hotter_K_ = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
+  correct(seen, std::fmin(innovation_K, believed_K), noise, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
 /// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
@@ -450,7 +454,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
   due_K_ = Row::Zero(n_ + 5);
-  pulled_K_ = model_moved_K_ = 0.0f;
+  pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
   for (int i = 0; i < n_; ++i) {

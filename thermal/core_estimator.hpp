@@ -163,6 +163,7 @@ class CoreEstimator {
   bool acquired_ = false, read_ = false, ambient_known_ = false;
   double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
   float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
+  float hotter_K_ = 0.0f;              // what the next reading that is too hot counts for
   float model_moved_K_ = 0.0f;         // how far the model says the housing moved in about two minutes,
   float reading_slow_degC_ = 0.0f, reading_moved_K_ = 0.0f;  // and how far the reading did
   float last_sensor_degC_ = 0.0f;

@@ -323,6 +323,16 @@ TEST(Estimator, AHotReadingAlwaysRaises) {
   EXPECT_GT(bench.core.estimate().hottest_degC(), before + 15);
 }
 
+TEST(Estimator, AGlitchUpwardsIsForgottenAndAHousingThatStaysHotIsFollowed) {
+  Bench bench(reference::ec16(), with(thermal::identified_trust), 25);
+  bench.run(120, 2);
+  bench.run(1, 2, [] { return Reading{190.0f, true}; });
+  bench.run(60, 2);
+  EXPECT_LT(bench.core_error_K(), 5) << "a hundred kelvin for hours, were each reading believed at once";
+  bench.run(20, 2, [&] { return Reading{bench.honest().value + 100, true}; });
+  EXPECT_GT(bench.core_error_K(), 90);
+}
+
 TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
   for (double bad : {nan, std::numeric_limits<double>::infinity(), -1.0}) {
     CoreEstimator good(thermal::three_phase_set(reference::ec16()), {}), spoiled = good;
