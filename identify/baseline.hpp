@@ -6,13 +6,6 @@
 
 namespace identify {
 
-/// Part of a problem that the fit may not see.
-struct HoldOut {
-  std::vector<Log> logs;  // whole logs, or none
-  double fraction = 0;    // last part of each log, 0: none
-  int draws = 1000;       // of the bootstrap
-};
-
 /// Two resistors fitted by themselves. Throws UserError (unusable) where no such motor can be.
 Fit fit_baseline(const Problem& problem);
 

@@ -32,7 +32,9 @@ void sort(std::vector<Candidate>& list) {
   std::sort(list.begin(), list.end(), [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
 }
 
-/// Two causes that claim the same slot of the model cannot both be applied.
+/// Two causes that claim the same slot of the model cannot both be applied. And a current that one log scales otherwise
+/// must explain all: beside another cause it takes up what that leaves of how the logs' loads differ (traction, seed
+/// 130, five drives: the winding foretold worse than by two resistors).
 bool compatible(const std::vector<Chosen>& have, const Chosen& more) {
   const Cause& b = cause_of(more);
   int nodes = b.edit == Edit::mass || b.edit == Edit::hot_spot;
@@ -40,6 +42,7 @@ bool compatible(const std::vector<Chosen>& have, const Chosen& more) {
     const Cause& a = cause_of(c);
     if (c.cause == more.cause && (!of_one_log(b) || c.log == more.log)) return false;
     if (a.edit == Edit::sink_law && b.edit == Edit::sink_law) return false;
+    if (a.edit == Edit::current_of_log || b.edit == Edit::current_of_log) return false;
     nodes += a.edit == Edit::mass || a.edit == Edit::hot_spot;
   }
   return nodes <= 2;

@@ -122,7 +122,7 @@ const std::vector<Cause>& causes() {
            "current and resistance of the winding instead of the power of the supply"),
       edit("current_scale",
            "the current of one of the logs was scaled otherwise (another sensor, amplifier or firmware)",
-           Edit::current_of_log, Needs::logs_of_current, {{"factor", "", Scale::one, 0.5, 2, 0.2, true, 1}},
+           Edit::current_of_log, Needs::logs_of_current, {{"factor", "", Scale::one, 0.7, 1.4, 0.05, true, 1}},
            "one log heats slower or faster from its first second", "cooling_change, copper_coefficient",
            "both logs' current beside one clamp; the winding read in both"),
       edit("third_mass", "a further mass on the housing (mount, rotor, gear)", Edit::mass, Needs::nothing,

@@ -244,8 +244,7 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
 /// are nearly as good as the named one, and of two resistors and what is likelier by the log and only too little to be
 /// named, it gets the one that bears a push the shortest. Where nothing explains the log, no fit is worth more than a
 /// sheet.
-Offer for_the_board(const Problem& problem, const Search& found, Report& report) {
-  const Fit& best = found.chosen.fit;
+Offer for_the_board(const Problem& problem, const Search& found, const Fit& best, Report& report) {
   const bool unexplained = found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient;
   const thermal::Trust trust = trust_of(problem, best, unexplained ? thermal::sheet_trust : thermal::identified_trust);
   std::vector<Offer> open = {{&best, trust}};
@@ -298,15 +297,15 @@ struct Judged {
 };
 
 /// `held_out`: part of the data is, and a cause that spoils the last quarter of the rest is refused.
-Judged judged(const Problem& problem, const Fit& base, const std::vector<Log>& logs,
-              const std::optional<wire::pc::MotorFile>& motor, bool held_out, const Tell& doing) {
+Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
+              bool held_out, const Tell& doing) {
   Judged out;
   auto& [found, poor, vetoed] = out;
   poor = too_poor(problem);
   if (!poor.empty()) return out;
   found = search(problem, {}, {}, doing);
   doing("asking whether the logs can tell, and whether they are read right");
-  poor = too_short(problem, base, found);
+  poor = too_short(problem, found);
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
   if (poor.empty()) poor = clipped(found, logs);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
@@ -451,39 +450,38 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
   const Fit base = fit_baseline(problem);
   report.reasoning = noise_words(problem);
-  auto [found, poor, vetoed] = judged(problem, base, logs, motor, unseen.has_value(), doing);
+  auto [found, poor, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
   widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
   // more: of 33 such sets 8 did worse on another log (those of score's outside and removed rows, seeds 893 and 894).
-  std::optional<Fit> nearest;
-  if (poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty()) nearest = found.chosen.fit;
+  const bool near = poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty();
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
   const Fit two = found.base.fit.valid() ? found.base.fit : base;
   const bool wrong = poor.empty() && found.verdict != Verdict::adequate;
   const Fit compared = wrong ? as_unsure_as_unseen(problem, closest(problem, two)) : two;
   judge_baseline(problem, compared, found.base.ratio, logs, motor, report);
-  if (!extended) found.chosen.fit = two;
+  const Fit& answer = extended ? found.chosen.fit : two;
   if (!poor.empty()) {
     report.verdict = found.verdict = Verdict::insufficient;
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
-    report.extended_rmse = rmse_of(problem, found.chosen.fit);
+    report.extended_rmse = rmse_of(problem, answer);
     tell(problem, found, report);
     if (found.verdict != Verdict::adequate) note_still_ambient(logs, report);
     const std::string untried = not_tried(problem, logs);
     if (!untried.empty())
       (found.verdict == Verdict::unknown_cause ? report.notes : report.reasoning).push_back(untried);
   }
-  const Offer offer = for_the_board(problem, found, report);
+  const Offer offer = for_the_board(problem, found, answer, report);
   if (extended) {
-    add_extended(problem, found.chosen.fit, report, 0);
-    report.extended = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()));
+    add_extended(problem, answer, report, 0);
+    report.extended = base_lines(problem, answer, std::max(1.0, answer.ratio()));
     // A heat that no longer depends on the winding, say, leaves R1 open.
-    if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, found.chosen.fit);
+    if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, answer);
     doing("playing a push on a board");
     if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
     if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
@@ -497,10 +495,11 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   }
   if (unseen) {
     doing("scoring what was held out");
-    report.held_out = score_held_out(*unseen, problem, held, compared, nearest ? *nearest : found.chosen.fit, report);
-    if (nearest) {
-      report.held_out->nearest = ids_of(nearest->chosen);
-      report.held_out->like = listed(names_of(nearest->chosen), " and ");
+    const Fit& tried = near ? found.chosen.fit : answer;
+    report.held_out = score_held_out(*unseen, problem, held, compared, tried, report);
+    if (near) {
+      report.held_out->nearest = ids_of(tried.chosen);
+      report.held_out->like = listed(names_of(tried.chosen), " and ");
     }
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }

@@ -2,8 +2,8 @@
 // From logs to a report: fit, judge, name, extend, measure the gain.
 #pragma once
 
-#include "identify/baseline.hpp"
 #include "identify/doing.hpp"
+#include "identify/held_out.hpp"
 
 namespace identify {
 

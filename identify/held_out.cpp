@@ -77,7 +77,7 @@ Interval middle_95(const std::vector<double>& sorted) {
 
 /// What was held out may speak against the answer: what was found does worse there, or all that was fitted misses far
 /// more than where it was fitted.
-std::string speaks_against(const std::vector<Block>& blocks, const HeldOut& out, const Report& report) {
+std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore& out, const Report& report) {
   const auto of = [&](const Rmse& e) { return out.winding ? e.core_K : e.housing_K; };
   const double before_K = of(out.before), after_K = of(out.after);
   const char* what = out.winding ? "winding" : "housing";
@@ -105,7 +105,7 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOut& out,
 }
 
 void judge(const Problem& problem, const Fit& base, const Fit& extended, int draws, const Report& report,
-           HeldOut& out) {
+           HeldOutScore& out) {
   out.winding = problem.any_core();
   const auto blocks = blocks_of(problem, base, extended, out.winding);
   out.blocks = static_cast<int>(blocks.size());
@@ -126,9 +126,9 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
   return out;
 }
 
-HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
-                       const Fit& extended, Report& report) {
-  HeldOut out;
+HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+                            const Fit& extended, Report& report) {
+  HeldOutScore out;
   Fit before, after;
   const char* remark = " (not seen by the fit)";
   if (held.fraction > 0) {

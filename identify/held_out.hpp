@@ -7,13 +7,20 @@
 
 namespace identify {
 
+/// Part of a problem that the fit may not see.
+struct HoldOut {
+  std::vector<Log> logs;  // whole logs, or none
+  double fraction = 0;    // last part of each log, 0: none
+  int draws = 1000;       // of the bootstrap
+};
+
 /// What `fitted` has not seen of `logs`, or the logs held out.
 Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held);
 
 /// Errors of both models on that, with a bootstrap interval over blocks of a minute. What was held out is added to
 /// the report's plots.
-HeldOut score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
-                       const Fit& extended, Report& report);
+HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+                            const Fit& extended, Report& report);
 
 /// Why the extended model must not be believed: fitted to the first three quarters of each log it misses the last by
 /// more than the two-resistor model does, and by more than chance explains. Empty: it may.

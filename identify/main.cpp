@@ -7,12 +7,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <map>
-#include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
 #include "identify/doing.hpp"
+#include "identify/score_logs.hpp"
 #include "wire/pc/files.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/user_error.hpp"
@@ -87,82 +85,6 @@ identify::HoldOut hold_out(const std::string& what, std::vector<std::string>& pa
   return out;
 }
 
-/// Ids in a truth file (host-sim record --hide writes them): { "causes": [ { "id": ... } ] }.
-std::vector<std::string> truth_in(const std::string& path) {
-  std::ifstream in(path);
-  const auto json = nlohmann::json::parse(in, nullptr, false);
-  if (!json.is_object() || !json.contains("causes") || !json["causes"].is_array()) {
-    refuse(path + ": is no truth file; host-sim record --hide writes one beside each log.");
-  }
-  std::vector<std::string> ids;
-  for (const auto& cause : json["causes"])
-    ids.push_back(cause.is_string()   ? cause.get<std::string>()
-                  : cause.is_object() ? cause.value("id", std::string("?"))
-                                      : "?");
-  std::sort(ids.begin(), ids.end());
-  return ids;
-}
-
-const char* outcome_of(const identify::Report& report, const std::vector<std::string>& named,
-                       const std::vector<std::string>& truth) {
-  if (identify::names_causes(report.verdict)) return named == truth ? "named right" : "named wrong";
-  if (report.verdict == Verdict::ambiguous) {
-    const bool among = std::find(report.tied.begin(), report.tied.end(), truth) != report.tied.end();
-    return among ? "tied with the truth" : "tied without it";
-  }
-  if (report.verdict == Verdict::adequate) return truth.empty() ? "rightly silent" : "silent";
-  return "unknown or insufficient";
-}
-
-/// How often each answer was given to each truth. Columns have numbers, for names are long.
-void print_confusions(const std::map<std::string, std::map<std::string, int>>& answers_to) {
-  std::map<std::string, int> columns;
-  for (const auto& [truth, answers] : answers_to) columns.insert(answers.begin(), answers.end());
-  int number = 0;
-  fmt::print("\n{:<40}", "truth \\ answer");
-  for (auto& [answer, column] : columns) fmt::print("{:>4}", column = ++number);
-  for (const auto& [truth, answers] : answers_to) {
-    fmt::print("\n{:<40}", truth);
-    for (const auto& [answer, column] : columns)
-      fmt::print("{:>4}", answers.contains(answer) ? std::to_string(answers.at(answer)) : ".");
-  }
-  fmt::print("\n");
-  for (const auto& [answer, column] : columns) fmt::print("{:>4}  {}\n", column, answer);
-}
-
-/// Answers each log by itself, and only then opens its truth: one line a log, then how often each outcome came,
-/// and what was taken for what.
-int score(const Arguments& a, const identify::ColumnMap& map, const std::optional<wire::pc::MotorFile>& motor) {
-  if (a.truths.size() != a.logs.size()) {
-    refuse(fmt::format("--score: {} truth files for {} logs; give one for each, in the same order.", a.truths.size(),
-                       a.logs.size()));
-  }
-  for (const std::string& path : a.truths) {
-    if (!std::filesystem::is_regular_file(path))
-      refuse("--score: " + path + ": there is no such file; check the path.");
-  }
-  std::map<std::string, int> outcomes;
-  std::map<std::string, std::map<std::string, int>> answers_to;
-  fmt::print("{:<40} {:<32} {:<18} {}\n", "log", "truth", "verdict", "answer");
-  for (std::size_t i = 0; i < a.logs.size(); ++i) {
-    const identify::Report report = identify::discover(read(a.logs[i], map, motor), motor);
-    const auto truth = truth_in(a.truths[i]);
-    std::vector<std::string> named;
-    for (const auto& cause : report.causes) named.push_back(cause.id);
-    std::sort(named.begin(), named.end());
-    const std::string outcome = outcome_of(report, named, truth);
-    const std::string hidden = fmt::format("{}", fmt::join(truth, " + ")),
-                      name = fmt::format("{}", fmt::join(named, " + "));
-    ++outcomes[outcome];
-    const std::string verdict = identify::word(report.verdict);
-    ++answers_to[hidden.empty() ? "nothing" : hidden][identify::names_causes(report.verdict) ? name : verdict];
-    fmt::print("{:<40} {:<32} {:<18} {} ({})\n", a.logs[i], hidden, verdict, name, outcome);
-  }
-  for (const auto& [outcome, count] : outcomes) fmt::print("{:>5}  {}\n", count, outcome);
-  print_confusions(answers_to);
-  return 0;
-}
-
 void show(const std::string& text) {
   if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     refuse("standard output: cannot be written; the answer is not complete.");
@@ -191,7 +113,11 @@ int answer(Arguments a) {
   map.rows = a.rows;
   if (a.period_s) map.period_s = *a.period_s;
   if (a.ambient_degC) map.ambient_degC = *a.ambient_degC;
-  if (!a.truths.empty()) return score(a, map, motor);
+  if (!a.truths.empty()) {
+    identify::score_logs(
+        a.logs, a.truths, [&](const std::string& path) { return read(path, map, motor); }, motor);
+    return 0;
+  }
   std::optional<identify::Doing> doing(std::in_place);
   (*doing)("reading");
   identify::HoldOut held = hold_out(a.hold_out, a.logs, map, motor);

@@ -379,7 +379,8 @@ std::string too_poor(const Problem& problem) {
   return "";
 }
 
-std::string too_short(const Problem& problem, const Fit& base, const Search& found) {
+std::string too_short(const Problem& problem, const Search& found) {
+  const Fit& base = found.two_resistors;
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
   const auto time_constant_s = [](const Fit& f) {

@@ -14,7 +14,7 @@ namespace identify {
 std::string too_poor(const Problem& problem);
 
 /// Shorter than the housing's time constant, or too short or of too even a load for what was found? Empty when not.
-std::string too_short(const Problem& problem, const Fit& base, const Search& found);
+std::string too_short(const Problem& problem, const Search& found);
 
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
 std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,

@@ -52,7 +52,7 @@ struct Interval {
   double low, high;
 };
 
-struct HeldOut {
+struct HeldOutScore {
   std::string how;
   Rmse before, after;
   std::vector<std::string> nearest;             // where no set explains all: the one that `after` is of
@@ -89,8 +89,8 @@ inline constexpr const char* gauge_words =
     "all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be "
     "seen";
 std::string cause_heading(Verdict verdict);           // "Behaves like"
-std::string nearest_words(const HeldOut& held_out);   // which has a nearest set
-std::string interval_words(const HeldOut& held_out);  // which has intervals
+std::string nearest_words(const HeldOutScore& held_out);   // which has a nearest set
+std::string interval_words(const HeldOutScore& held_out);  // which has intervals
 std::string whiteness_words(const Whiteness& of_residual);
 
 struct GainLine {
@@ -124,7 +124,7 @@ struct Report {
   std::vector<ParameterLine> extended;         // R1, R2, C1, C2 beside the causes
   std::vector<std::vector<std::string>> tied;  // ids of the sets named or tied, the best first; else empty
   std::vector<Rung> ladder;
-  std::optional<HeldOut> held_out;
+  std::optional<HeldOutScore> held_out;
   std::optional<Gain> gain;
   std::optional<Experiment> experiment;
   std::string no_model;       // why no board gets a set of this; empty: the two below are there

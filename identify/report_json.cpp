@@ -91,7 +91,7 @@ std::string as_json(const Report& r) {
   }
   out["held_out"] = nullptr;
   if (r.held_out) {
-    const HeldOut& h = *r.held_out;
+    const HeldOutScore& h = *r.held_out;
     out["held_out"] = {{"how", h.how},
                        {"rmse_before_K", rms(h.before)},
                        {"rmse_after_K", rms(h.after)},

@@ -99,7 +99,7 @@ std::string named(const Report& r) {
 
 std::string unseen(const Report& r) {
   if (!r.held_out) return "";
-  const HeldOut& h = *r.held_out;
+  const HeldOutScore& h = *r.held_out;
   std::string s = fmt::format("\nOn data it has not seen ({})\n  before: {}\n", h.how, rmse(h.before));
   for (std::size_t i = 0; i < h.each_before.size(); ++i)
     s += fmt::format("    {}: {}\n", h.names[i], rmse(h.each_before[i]));
@@ -133,11 +133,11 @@ std::string cause_heading(Verdict verdict) {
                                                 : "Behaves like";
 }
 
-std::string nearest_words(const HeldOut& h) {
+std::string nearest_words(const HeldOutScore& h) {
   return fmt::format("by the nearest set, {}, which is not believed", h.like);
 }
 
-std::string interval_words(const HeldOut& h) {
+std::string interval_words(const HeldOutScore& h) {
   return fmt::format(
       "95 % interval of the {}'s rms, from redrawing {} blocks of a minute: {:.2f} to {:.2f} K before, {:.2f} to "
       "{:.2f} K after",
