@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "identify/baseline.hpp"
 #include "identify/parallel.hpp"
 
 namespace identify {
@@ -270,6 +271,13 @@ std::vector<Chosen> available(const Problem& problem, const std::vector<std::str
 void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& field) {
   Candidate base;
   base.fit = field.base.fit.valid() ? fit(problem, {}, {&field.base.fit}) : fit(problem, {});
+  // An unseen winding under one cycle has valleys without number: a base that is stuck in one makes a cause of the
+  // rest.
+  if (base.fit.valid()) {
+    const Fit near = closest(problem, base.fit);
+    Fit other = fit(problem, {}, {&near});
+    if (other.cost < base.fit.cost) base.fit = std::move(other);
+  }
   base.ratio = base.fit.ratio();
   field.base = std::move(base);
   if (!field.base.fit.valid()) return field.singles.clear();
