@@ -219,11 +219,8 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
   const Log& first = logs.front();
   for (const Log& log : logs) {
     if (log.has(Role::power) != first.has(Role::power) || log.torque_for_A != first.torque_for_A) {
-      const auto kind = [](const Log& l) {
-        return l.has(Role::power) ? "a power" : l.torque_for_A ? "a torque" : "a current";
-      };
-      wire::pc::refuse_data(fmt::format("{}: its heat is recorded as {}, that of {} as {}; give logs of one kind.",
-                                        log.name, kind(log), first.name, kind(first)));
+      wire::pc::refuse_data(fmt::format("{}: its heat is recorded as a {}, that of {} as a {}; give logs of one kind.",
+                                        log.name, heat_word(log), first.name, heat_word(first)));
     }
   }
   const std::pair<Role, const char*> taken[] = {{Role::speed, "nothing in it is taken to go by speed"},

@@ -62,7 +62,9 @@ void check_normalised(const Log& log) {
     for (const Role role : roles) largest = std::max(largest, largest_magnitude(log.of(role)));
     return largest > 0 && largest <= most;
   };
-  if (told_small(temperatures) && told_small(load_roles))
+  const auto moves = [&](Role role) { return largest_magnitude(spacing(log.of(role))) > 0; };
+  if (told_small(temperatures) && told_small(load_roles) &&
+      std::any_of(std::begin(temperatures), std::end(temperatures), moves))
     refuse_data(
         fmt::format("{}: no column, temperatures and load, exceeds {:g}, as if they were normalised; give them as "
                     "they were measured, in degC, A and rad/s.",
@@ -395,6 +397,10 @@ Role heat_of(const Log& log) {
     if (log.has(role)) return role;
   }
   return Role::iq;
+}
+
+const char* heat_word(const Log& log) {
+  return log.has(Role::power) ? "power" : log.torque_for_A ? "torque" : "current";
 }
 
 Role sink_of(const Log& log) { return log.has(Role::coolant) ? Role::coolant : Role::ambient; }

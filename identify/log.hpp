@@ -53,6 +53,7 @@ bool resumes(const Log& log, double after_s, double until_s);
 
 /// What tells the heat: a power, else a current; iq of currents along two axes.
 Role heat_of(const Log& log);
+const char* heat_word(const Log& log);  // "current", "power" or "torque"
 
 /// What takes the heat away: the coolant, else the ambient.
 Role sink_of(const Log& log);

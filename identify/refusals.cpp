@@ -496,10 +496,10 @@ std::string too_sparse(const Problem& problem, const Search& found, const std::v
   for (const Bins& log : problem.logs) apart_s = std::max(apart_s, log.interval_s);
   return fmt::format(
       "What {}, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
-      "in cells that were not measured, and when exactly moves the {} by as much; record the current in every row and "
+      "in cells that were not measured, and when exactly moves the {} by as much; record the {} in every row and "
       "more often.",
       unknown ? "no cause explains" : "was found beside two resistors", asked_K, apart_s,
-      problem.logs.front().has_housing ? "housing" : "winding");
+      problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
 }
 
 }  // namespace identify
