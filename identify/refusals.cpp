@@ -73,10 +73,11 @@ std::string unlike_the_motor(const Problem& problem, const Search& found, const 
   }
   if (!problem.belief.known) return "";
   // Where something else is wrong, what heats slowly may pass for a winding: masses change places. Windings shipped are
-  // within a factor of two of their sheet.
+  // within a factor of two of their sheet. A hot spot beside it may be the winding, and what is heavy its teeth.
   constexpr double much = 5;
   const ParameterLine C1 = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()))[2];
-  if (!found.chosen.fit.chosen.empty() && C1.determined && C1.value > much * problem.belief.C1_J_per_K)
+  const bool none_faster = coordinate_of(found.chosen.fit, Edit::hot_spot) < 0;
+  if (!found.chosen.fit.chosen.empty() && none_faster && C1.determined && C1.value > much * problem.belief.C1_J_per_K)
     return fmt::format(
         "Beside {} the winding would take up {:.3g} J/K, {:.2g} times its sheet: another mass stands in its place. "
         "Read the winding{}, or see whether {} is this motor.",
