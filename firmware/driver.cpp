@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "firmware/driver.hpp"
 
+#include <algorithm>
+
 namespace firmware {
 
 namespace {
@@ -29,7 +31,7 @@ void Driver::start_hot() {
 void Driver::slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]) {
   const double used_A2[axis_count] = {axes_[0].current2_A2(), axes_[1].current2_A2()};  // of the last slow tick
   board_heat_.tick(used_A2[0], used_A2[1], {board.power_stage.value_degC, board.power_stage.valid},
-                   axes_[0].elapsed_steps());
+                   std::max(axes_[0].elapsed_steps(), axes_[1].elapsed_steps()));
   for (int i = 0; i < axis_count; ++i)
     axes_[i].slow_tick(axes[i], {board_heat_.allowed_A(used_A2[1 - i], governor_), wire::Limit::board_hot});
 }
