@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identify/bins.hpp"
 #include "identify/median.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -214,8 +215,7 @@ void note_gaps(Log& log) {
       continue;
     }
     // Five missed rows in a row are a gap, less is jitter; and what a bin may hold goes into its mean.
-    constexpr double of_a_bin_s = 2;  // longest_bin_s
-    if (dt_s > std::max(5 * usual_s, of_a_bin_s)) held_s += dt_s - usual_s, ++gaps;
+    if (dt_s > std::max(5 * usual_s, longest_bin_s)) held_s += dt_s - usual_s, ++gaps;
   }
   const double duration_s = t.back() - t.front();
   log.gap_share = duration_s > 0 ? held_s / duration_s : 0;
