@@ -47,10 +47,11 @@ class BoardHeat {
   float allowed_A(double other_A2, const GovernorSettings& settings) const {
     const float left_A2 = other_A2 >= 0.0 ? limit_A2_ - static_cast<float>(other_A2) : 0.0f;
     const float hold_A2 = left_A2 < 0.5f * limit_A2_ ? 0.5f * limit_A2_ : left_A2;
-    const NodeBudget pole{limit_A2_, rating_.tau_s, hold_A2, 1.0f};
+    const NodeBudget pole{limit_A2_, rating_.tau_s, hold_A2, 1.0f, 1.0f};
     GovernorSettings s = settings;
     s.margin_K = 0.1f * limit_A2_;
     s.coldest_degC = 0.0f;
+    s.soft_K = 1e-3f * limit_A2_;  // one pole that is counted has neither neighbours nor noise
     const float used_A2 = static_cast<float>(used_A2_);
     const float soft_A = allowed_current_A(used_A2, pole, s), hard_A = ceiling_current_A(used_A2, pole, s);
     return soft_A < hard_A ? soft_A : hard_A;

@@ -19,8 +19,11 @@ bool usable(float core_degC, const NodeBudget& node, const GovernorSettings& s) 
          node.gain_W_per_A2 >= 0.0f && s.max_A > 0.0f;
 }
 
-float holding_A(const NodeBudget& node) {
-  return node.hold_W > 0.0f ? std::sqrt(node.hold_W / node.gain_W_per_A2) : 0.0f;
+float holding_A(const NodeBudget& node, const GovernorSettings& s) {
+  if (!(node.hold_W > 0.0f && node.conductance_W_per_K > 0.0f)) return 0.0f;
+  const float soft_A = s.max_A * (node.hold_W / (node.conductance_W_per_K * s.soft_K));
+  const float direct_A = node.gain_W_per_A2 > 0.0f ? std::sqrt(node.hold_W / node.gain_W_per_A2) : s.max_A;
+  return smallest(s.max_A, smallest(direct_A, soft_A));
 }
 
 /// Above the limit the holding current runs out linearly within the margin.
@@ -28,33 +31,32 @@ float over_limit_A(float hold_A, float over_K, const GovernorSettings& s) {
   return hold_A * (1.0f - over_K / s.margin_K);
 }
 
-// A node that current reaches only through others fades within this band: half a housing's usual margin to its limit.
-constexpr float fade_K = 10.0f;
-
 }  // namespace
 
 float allowed_current_A(float core_degC, const NodeBudget& node, const GovernorSettings& s) {
   if (!usable(core_degC, node, s)) return 0.0f;
-  const float room_K = node.limit_degC - core_degC;
-  if (!(node.gain_W_per_A2 > 0.0f)) return clamped(s.max_A * (room_K / fade_K), s.max_A);
-  const float hold_A = smallest(holding_A(node), s.max_A);
-  const float room_J = node.capacity_J_per_K * room_K;
+  const float room_K = node.limit_degC - core_degC, room_J = node.capacity_J_per_K * room_K;
+  const float hold_A = holding_A(node, s);
+  const float soft_A = hold_A + s.max_A * (room_K / s.soft_K);
+  if (!(node.gain_W_per_A2 > 0.0f))
+    return clamped(room_K < 0.0f ? smallest(soft_A, over_limit_A(hold_A, -room_K, s)) : soft_A, s.max_A);
   const float slope_A_per_s = s.slope_per_s * s.max_A;
   const float S_W_per_A = node.gain_W_per_A2 * (s.max_A + hold_A);
   const float line_J = slope_A_per_s * S_W_per_A * s.approach_s * s.approach_s;  // the straight stretch ends here
   const float line_A_per_J = 1.0f / (S_W_per_A * s.approach_s);
-  if (room_J < 0.0f)
-    return clamped(smallest(hold_A + room_J * line_A_per_J, over_limit_A(hold_A, -room_K, s)), s.max_A);
-  if (room_J < line_J) return clamped(hold_A + room_J * line_A_per_J, s.max_A);
+  const float line_A = hold_A + room_J * line_A_per_J;
+  if (room_J < 0.0f) return clamped(smallest(largest(line_A, soft_A), over_limit_A(hold_A, -room_K, s)), s.max_A);
+  if (room_J < line_J) return clamped(smallest(line_A, soft_A), s.max_A);
   const float root_A = std::sqrt(2.0f * slope_A_per_s / S_W_per_A * (room_J - 0.5f * line_J));
-  return clamped(hold_A + largest(root_A, line_J * line_A_per_J), s.max_A);  // largest: rounding must not step down
+  const float steep_A = hold_A + largest(root_A, line_J * line_A_per_J);  // largest: rounding must not step down
+  return clamped(smallest(steep_A, soft_A), s.max_A);
 }
 
 float ceiling_current_A(float core_degC, const NodeBudget& node, const GovernorSettings& s) {
   if (!usable(core_degC, node, s)) return 0.0f;
-  if (!(node.gain_W_per_A2 > 0.0f)) return s.max_A;
   const float room_K = node.limit_degC - core_degC;
-  if (room_K < 0.0f) return clamped(over_limit_A(holding_A(node), -room_K, s), s.max_A);
+  if (room_K < 0.0f) return clamped(over_limit_A(holding_A(node, s), -room_K, s), s.max_A);
+  if (!(node.gain_W_per_A2 > 0.0f)) return s.max_A;
   const float power_W = node.hold_W + node.capacity_J_per_K * room_K / s.horizon_s;
   return power_W > 0.0f ? clamped(std::sqrt(power_W / node.gain_W_per_A2), s.max_A) : 0.0f;
 }
@@ -91,11 +93,13 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
   unit[Drive::current_A2] = 1.0;
   unit[Drive::current2_speed2] = core.input()[Drive::speed2_rad2_per_s2];
   const double capacity_J_per_K = core.network().capacity_J_per_K(node);
+  const double hold_W = -core.network().rate_K_per_s(held, rest)[node] * capacity_J_per_K;
+  held[node] -= 1.0;
+  const double colder_W = -core.network().rate_K_per_s(held, rest)[node] * capacity_J_per_K;
   // In a burst k sigma grows with the rise: what is limited moves like a winding that stores less.
   const double burst_J_per_K = capacity_J_per_K / static_cast<double>(core.burst_margin());
-  return {now.max_degC[node], static_cast<float>(burst_J_per_K),
-          static_cast<float>(-core.network().rate_K_per_s(held, rest)[node] * capacity_J_per_K),
-          static_cast<float>(core.network().source_W(node, at_degC, unit))};
+  return {now.max_degC[node], static_cast<float>(burst_J_per_K), static_cast<float>(hold_W),
+          static_cast<float>(core.network().source_W(node, at_degC, unit)), static_cast<float>(hold_W - colder_W)};
 }
 
 Allowance Governor::tick(const CoreEstimator& core) {
@@ -111,7 +115,7 @@ Allowance Governor::tick(const CoreEstimator& core) {
     if (!(node_A >= allowed_A)) {
       allowed_A = node_A;
       best.node = static_cast<std::int8_t>(i);
-      best.holding_A = budget.gain_W_per_A2 > 0.0f ? smallest(holding_A(budget), settings_.max_A) : 0.0f;
+      best.holding_A = holding_A(budget, settings_);
       best.limit = core_degC < 1e30f ? wire::Limit::core_hot : wire::Limit::blind;
     }
     ceiling_A = smallest(ceiling_current_A(core_degC, budget, settings_), ceiling_A);

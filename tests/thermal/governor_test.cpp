@@ -25,7 +25,7 @@ using thermal::NodeBudget;
 const float inf = std::numeric_limits<float>::infinity();
 
 /// EC 16 with a 25 degC housing: 120 W hold at 155 degC.
-const NodeBudget small_motor{155.0f, 1.13f, 120.4f, 1.133f};
+const NodeBudget small_motor{155.0f, 1.13f, 120.4f, 1.133f, 0.926f};
 
 /// Runs every `stride`-th float through both kernels on two threads; returns what broke, or nothing.
 template <class Allowed>
@@ -78,12 +78,14 @@ TEST(Governor, EveryFloatIsSafeAndNoneRisesWithTemperature) { EXPECT_EQ(run_all_
 
 TEST(Governor, OtherMotorsAreSafeForASampleOfAllFloats) {
   GovernorSettings s;
-  EXPECT_EQ(run_all_floats({155.0f, 0.38f, -20.0f, 0.7f}, s, 101), "") << "neighbours alone overheat it";
-  EXPECT_EQ(run_all_floats({155.0f, 10.1f, 620.0f, 0.12f}, s, 101), "") << "200 W motor";
-  EXPECT_EQ(run_all_floats({100.0f, 18.0f, 0.0f, 0.0f}, s, 101), "") << "limit of a node that current does not heat";
-  EXPECT_EQ(run_all_floats({155.0f, 1e-3f, 1e9f, 1e-9f}, s, 101), "") << "absurd";
+  EXPECT_EQ(run_all_floats({155.0f, 0.38f, -20.0f, 0.7f, 0.9f}, s, 101), "") << "neighbours alone overheat it";
+  EXPECT_EQ(run_all_floats({155.0f, 10.1f, 620.0f, 0.12f, 4.8f}, s, 101), "") << "200 W motor";
+  EXPECT_EQ(run_all_floats({100.0f, 18.0f, 0.0f, 0.0f, 1.0f}, s, 101), "")
+      << "limit of a node that current does not heat";
+  EXPECT_EQ(run_all_floats({110.0f, 3.0f, 5.0f, 1e-5f, 0.6f}, s, 101), "") << "reached mostly through others";
+  EXPECT_EQ(run_all_floats({155.0f, 1e-3f, 1e9f, 1e-9f, 1e-9f}, s, 101), "") << "absurd";
   s.max_A = 80.0f;
-  EXPECT_EQ(run_all_floats({155.0f, 10.1f, 0.0f, 0.12f}, s, 101), "") << "80 A board, housing at the limit";
+  EXPECT_EQ(run_all_floats({155.0f, 10.1f, 0.0f, 0.12f, 4.8f}, s, 101), "") << "80 A board, housing at the limit";
 }
 
 TEST(Governor, TheFloatRunFindsLimitersThatFailOpen) {
@@ -102,16 +104,20 @@ TEST(Governor, TheFloatRunFindsLimitersThatFailOpen) {
 
 TEST(Governor, AnUnusableBudgetOrSettingAllowsNothing) {
   const float nan = std::nanf("");
-  for (const NodeBudget& node : {NodeBudget{nan, 1, 100, 1}, NodeBudget{155, nan, 100, 1}, NodeBudget{155, 0, 100, 1},
-                                 NodeBudget{155, 1, 100, nan}, NodeBudget{155, 1, 100, -1}}) {
+  for (const NodeBudget& node :
+       {NodeBudget{nan, 1, 100, 1, 1}, NodeBudget{155, nan, 100, 1, 1}, NodeBudget{155, 0, 100, 1, 1},
+        NodeBudget{155, 1, 100, nan, 1}, NodeBudget{155, 1, 100, -1, 1}}) {
     EXPECT_EQ(thermal::allowed_current_A(25, node, {}), 0.0f);
     EXPECT_EQ(thermal::ceiling_current_A(25, node, {}), 0.0f);
   }
-  EXPECT_LE(thermal::allowed_current_A(154.9f, {155, 1, nan, 1}, {}), 3.0f);
-  EXPECT_EQ(thermal::ceiling_current_A(25, {155, 1, nan, 1}, {}), 0.0f);
+  EXPECT_LE(thermal::allowed_current_A(154.9f, {155, 1, nan, 1, 1}, {}), 3.0f);
+  EXPECT_EQ(thermal::ceiling_current_A(25, {155, 1, nan, 1, 1}, {}), 0.0f);
   GovernorSettings s;
   s.max_A = nan;
   EXPECT_EQ(thermal::allowed_current_A(25, small_motor, s), 0.0f);
+  s = {};
+  s.soft_K = nan;
+  for (const float degC : {25.0f, 154.9f, 157.0f}) EXPECT_EQ(thermal::allowed_current_A(degC, small_motor, s), 0.0f);
   EXPECT_EQ(thermal::sloped_allowance_A(5, nan, 20, 0.01f, {}), 0.0f);
   EXPECT_EQ(thermal::sloped_allowance_A(5, 20, nan, 0.01f, {}), 0.0f);
 }
@@ -310,6 +316,70 @@ TEST(Governor, SensorNoiseMakesNoChatter) {
   }
   EXPECT_LE(largest_step, 0.05f);
   EXPECT_LE(std::sqrt(sum2 / n), 0.005);
+}
+
+/// A magnet of 3 J/K beside an EC 16's winding, both on the housing; magnet_gain of its own loss per A^2, W.
+struct MagnetPlant {
+  double gain_W_per_A2, winding_degC = 25, magnet_degC = 25, housing_degC = 25;
+  static constexpr double to_housing = 1 / 1.08, to_magnet = 1 / 3.0, magnet_to_housing = 0.3, to_ambient = 0.18;
+  void advance(double A2, double seconds) {
+    for (double left_s = seconds; left_s > 1e-9; left_s -= 0.005) {
+      const double ohm = 0.75 * (1 + 0.00393 * (winding_degC - 25)), over_magnet_K = winding_degC - magnet_degC,
+                   over_housing_K = winding_degC - housing_degC, magnet_K = magnet_degC - housing_degC;
+      winding_degC += 0.005 / 1.13 * (A2 * ohm - over_housing_K * to_housing - over_magnet_K * to_magnet);
+      magnet_degC += 0.005 / 3.0 * (A2 * gain_W_per_A2 + over_magnet_K * to_magnet - magnet_K * magnet_to_housing);
+      housing_degC += 0.005 / 18.0 *
+                      (over_housing_K * to_housing + magnet_K * magnet_to_housing - (housing_degC - 25) * to_ambient);
+    }
+  }
+};
+
+TEST(Governor, AMagnetThatCurrentReachesThroughTheWindingIsHeldAtItsLimitWithoutChatter) {
+  for (const double gain : {0.0, 1e-5, 1e-3, 3e-3, 1e-2, 0.1}) {
+    using P = MagnetPlant;
+    thermal::HeatSet<double> set{};
+    set.node_count = 3, set.link_count = 4, set.source_count = 2;
+    set.nodes[0] = {1.13, 155}, set.nodes[1] = {18, inf}, set.nodes[2] = {3, 110};
+    set.links[0] = {0, 1, thermal::LinkLaw::constant, P::to_housing, 0};
+    set.links[1] = {0, 2, thermal::LinkLaw::constant, P::to_magnet, 0};
+    set.links[2] = {2, 1, thermal::LinkLaw::constant, P::magnet_to_housing, 0};
+    set.links[3] = {1, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, P::to_ambient, 0};
+    set.sources[0] = {0, Drive::current_A2, 0.75, 0.00393};
+    set.sources[1] = {2, Drive::current_A2, gain, 0};
+    set.housing = {1, 0, 0, 0};
+    thermal::CoreEstimator core(set, Loop::exact());
+    thermal::Governor governor(GovernorSettings{});
+    P plant{gain};
+    std::mt19937 seed(3);
+    std::normal_distribution<float> noise(0.0f, 0.1f);
+    float allowance_A = 20, largest_step_A = 0;
+    double hottest_degC = 0, sum_A = 0;
+    for (int i = 0; i < 60000; ++i) {
+      const double A2 = static_cast<double>(allowance_A) * static_cast<double>(allowance_A);
+      plant.advance(A2, 0.01);
+      HeatInput<> input;
+      input[Drive::current_A2] = A2;
+      core.tick(input, {static_cast<float>(plant.housing_degC) + noise(seed), true}, {25.0f, true});
+      const float last_A = allowance_A;
+      allowance_A = governor.tick(core).current_A;
+      hottest_degC = std::max(hottest_degC, plant.magnet_degC);
+      if (i < 30000) continue;
+      largest_step_A = std::max(largest_step_A, std::abs(allowance_A - last_A));
+      sum_A += static_cast<double>(allowance_A);
+    }
+    double none_A = 0, burns_A = 20;  // the largest steady current
+    for (int i = 0; i < 12; ++i) {
+      P steady{gain};
+      const double middle_A = 0.5 * (none_A + burns_A);
+      for (int s = 0; s < 600 && steady.magnet_degC < 200; ++s) steady.advance(middle_A * middle_A, 1);
+      (steady.magnet_degC < 110 ? none_A : burns_A) = middle_A;
+    }
+    std::printf("  magnet heated by %g W/A^2: %.1f %% of the steady current, hottest %.2f degC, largest step %.4f A\n",
+                gain, 100 * sum_A / 30000 / none_A, hottest_degC, static_cast<double>(largest_step_A));
+    EXPECT_LE(largest_step_A, 0.05f) << gain;
+    EXPECT_GE(sum_A / 30000, 0.97 * none_A) << gain;
+    EXPECT_LE(hottest_degC, 110.5) << gain;
+  }
 }
 
 TEST(Governor, ABrokenEstimateAllowsNothingAndSaysBlind) {
