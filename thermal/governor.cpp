@@ -31,13 +31,21 @@ float over_limit_A(float hold_A, float over_K, const GovernorSettings& s) {
   return hold_A * (1.0f - over_K / s.margin_K);
 }
 
+/// Room to the limit when a running current has run out, K: no more than now, less where the neighbours are hotter yet.
+float soon_room_K(const NodeBudget& node, float room_K, const GovernorSettings& s) {
+  if (!(node.conductance_W_per_K > 0.0f)) return room_K;
+  const float left_K = node.hold_W / node.conductance_W_per_K;  // that the neighbours' mean is below the limit
+  const float share = node.conductance_W_per_K / (node.capacity_J_per_K * s.slope_per_s);
+  return smallest(room_K, (room_K + share * left_K) / (1.0f + share));
+}
+
 }  // namespace
 
 float allowed_current_A(float core_degC, const NodeBudget& node, const GovernorSettings& s) {
   if (!usable(core_degC, node, s)) return 0.0f;
   const float room_K = node.limit_degC - core_degC, room_J = node.capacity_J_per_K * room_K;
   const float hold_A = holding_A(node, s);
-  const float soft_A = hold_A + s.max_A * (room_K / s.soft_K);
+  const float soft_A = hold_A + s.max_A * (soon_room_K(node, room_K, s) / s.soft_K);
   if (!(node.gain_W_per_A2 > 0.0f))
     return clamped(room_K < 0.0f ? smallest(soft_A, over_limit_A(hold_A, -room_K, s)) : soft_A, s.max_A);
   const float slope_A_per_s = s.slope_per_s * s.max_A;

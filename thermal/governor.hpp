@@ -5,6 +5,7 @@
 //   holding current  ih^2 = (heat that leaves a node held at its limit) / (R(T_limit) share)
 //   braking law      i = ih + sqrt(2 slope E / S),  S = R share (i_max + ih),  E = C (T_limit - T)        (eq. 8)
 //   softness         neither ih nor i - ih grows by more than i_max within soft_K, of the neighbours or of the node
+//                    (where neighbours are hotter, of the node as it will be when the current has run out)
 //
 // E is what the node can still store. With eq. 8 a full push runs down to ih no faster than `slope`: dE/dt = -R share
 // (i^2 - ih^2) gives di/dt = -slope (i + ih)/(i_max + ih). Near ih a straight line replaces the root, whose endless
