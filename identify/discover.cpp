@@ -256,7 +256,7 @@ Offer for_the_board(const Problem& problem, const Search& found, const Fit& best
     }
   }
   if (open.size() == 1) return open.front();
-  const Offer& given = most_cautious(problem, open);
+  const Offer given = most_cautious(problem, open);
   report.reasoning.push_back(fmt::format(
       "The model written for the board is, of those that the log bears out about as well, the one that bears a "
       "push the shortest: {}.",

@@ -21,8 +21,9 @@ struct Offer {
   thermal::Trust trust;
 };
 
-/// The offer under which a board bears a push for the shortest time: the one to write where the data cannot choose. A
-/// set that the firmware refuses is passed over; the first where none can be asked (heat logged as power).
-const Offer& most_cautious(const Problem& problem, const std::vector<Offer>& offers);
+/// The offer under which a board bears a push for the shortest time: the one to write where the data cannot choose. Its
+/// cooling is doubted by as much as another offer carries less for an hour. A set that the firmware refuses is passed
+/// over; the first where none can be asked (heat logged as power).
+Offer most_cautious(const Problem& problem, const std::vector<Offer>& offers);
 
 }  // namespace identify
