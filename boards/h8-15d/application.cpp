@@ -18,6 +18,7 @@ namespace {
 constexpr std::uint32_t slow_channels[] = {vrefint_channel, ntc_channel[0], ntc_channel[1], board_ntc_channel,
                                            force_channel};
 constexpr int slow_count = 5;
+constexpr int slow_stale_ms = 100;  // a conversion takes one; what the safety table gives an open thermistor
 constexpr std::uint32_t paint = 0xC0DEC0DE;
 
 /// NTC to ground under a pull-up, read against its own supply. Open or short is no temperature.
@@ -181,8 +182,13 @@ void Application::every_ms(std::uint32_t ms) {
 void Application::read_slow_channel() {
   if (!stage_.slow_ready()) {
     stage_.ask_slow(slow_channels[slow_channel_]);
+    if (slow_wait_ms_ < slow_stale_ms && ++slow_wait_ms_ == slow_stale_ms) {
+      housing_[0] = housing_[1] = power_stage_ = {};  // what was read last is no reading any more
+      stage_.set_reference_good(false);
+    }
     return;
   }
+  slow_wait_ms_ = 0;
   const std::uint16_t counts = stage_.fetch_slow();
   switch (slow_channel_) {
     case 0: {

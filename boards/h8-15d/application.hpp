@@ -70,7 +70,7 @@ class Application {
   std::uint32_t fast_fed_ = 0, fed_[2]{}, slow_ticks_ = 0, slow_ms_ = 0;
   bool index_seen_[2]{};
   bool good_ = false, clock_good_ = false;
-  int slow_channel_ = 0, force_axis_ = 0;
+  int slow_channel_ = 0, force_axis_ = 0, slow_wait_ms_ = 0;
   hal::Temperature housing_[2]{}, power_stage_{};
   std::uint32_t door_serial_ = 0, door_wish_ = 0, door_order_ = 0;
 };

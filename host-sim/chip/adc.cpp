@@ -170,6 +170,7 @@ void Adc::finish_regular() {
   const int channel = static_cast<int>(field(peek(sqr3), 0, 5));
   const std::uint32_t counts = convert(channel, regular_end_ - 12 * clock());
   regular_end_ = never;
+  if (regular_lost_) return;
   watch(channel, false, counts);
   at(dr) = (peek(cr2) >> 11 & 1) ? counts << 4 : counts;
   at(sr) |= 1u << 1;

@@ -62,6 +62,8 @@ class Adc : public Device {
 
   /// Overrides what a conversion yields (stuck or wild sensor); negative: the pin decides.
   void force(int channel, int counts) { forced_[static_cast<std::size_t>(channel)] = counts; }
+  /// From now on no regular conversion ends.
+  void lose_regular() { regular_lost_ = true; }
   std::uint64_t injected_done() const { return done_; }
   double sampling_s(int channel) const { return sample_cycles(channel) * to_s(clock()); }
 
@@ -86,6 +88,7 @@ class Adc : public Device {
   std::array<bool, 4> fresh_{};
   Time injected_start_ = never, injected_end_ = never, regular_end_ = never, patience_ = never;
   std::uint64_t done_ = 0;
+  bool regular_lost_ = false;
 };
 
 }  // namespace host_sim::chip

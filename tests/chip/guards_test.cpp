@@ -174,6 +174,16 @@ TEST(Guards, ThermistorsAndForceSensorsAreReadAsTheyAreWired) {
   EXPECT_NEAR(pcb->door().bus_A, 500 * 3.3 / 4096 / (0.001 * 40), 0.05);
 }
 
+TEST(Guards, WhatIsNotReadAnyMoreIsNeitherATemperatureNorAReference) {
+  NEEDS_IMAGE(image);
+  auto pcb = driving();
+  EXPECT_FALSE(pcb->door().axis[0].estimate_flags & thermal::housing_missing);
+  pcb->chip.adc1.lose_regular();
+  EXPECT_LT(opens_after_s(*pcb, 0.2), 0.12);
+  hold(*pcb, 4.0f, 4.0f, 0.15);
+  for (int i : {0, 1}) EXPECT_TRUE(pcb->door().axis[i].estimate_flags & thermal::housing_missing) << i;
+}
+
 TEST(Guards, AnOpenOrShortedThermistorIsNoTemperature) {
   NEEDS_IMAGE(image);
   for (const int counts : {4095, 0}) {
