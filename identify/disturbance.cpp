@@ -75,8 +75,8 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   for (const std::vector<Disturbance>& larger : tried) {
     for (const Disturbance& d : larger) {
       if (d.evidence > out.evidence) out = d;
-      // A slower one counts where its smallest is near: taken at any size three tests failed (Search.WhereNoRest...,
-      // Search.WhereQuietSensors..., Traction.WhereNothingExplains...).
+      // A slower one counts where its smallest is near: taken at any size three tests failed (SlowSearch.WhereNoRest...,
+      // SlowSearch.WhereQuietSensors..., SlowTraction.WhereNothingExplains...).
       if (d.evidence < out.evidence - past_top) break;
     }
   }
