@@ -21,7 +21,7 @@
 namespace identify {
 
 /// Amplitude of the current vector over the direct current that heats alike.
-inline const double amplitude_per_direct = 2 / std::sqrt(3.0);
+inline constexpr double amplitude_per_direct = 1 / wire::direct_per_amplitude;
 inline constexpr double stalled_rad_per_s = 2;  // about three seconds a turn
 inline constexpr double longest_bin_s = 2;      // but of many hours under a slow winding (problem.cpp)
 

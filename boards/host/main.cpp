@@ -92,11 +92,7 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
     result = run_scene(scene, options);
   }
   const std::string folder = out + "/" + scene.id;
-  for (const Trace& trace : result.traces) {
-    const std::string axis = trace.axis == 0 ? "" : "-axis1";
-    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), axis), csv(result, trace));
-  }
-  draw(result, fmt::format("{}/{}.svg", folder, scene.id));
+  write_files(result, folder);
   if (json)
     fmt::print("{}", summary_json(result));
   else

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "boards/host/chip/play.hpp"
-#include "wire/pc/files.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
@@ -33,11 +32,7 @@ int run(const std::string& name, const std::vector<std::string>& overrides, cons
   });
   if (show) fmt::print(stderr, "\r\033[K");
   const std::string folder = out + "/" + scene.id;
-  for (const host::Trace& trace : play.result.traces) {
-    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), trace.axis == 0 ? "" : "-axis1"),
-                          csv(play.result, trace));
-  }
-  draw(play.result, fmt::format("{}/{}.svg", folder, scene.id));
+  write_files(play.result, folder);
   const double speed = play.result.simulated_s / play.wall_s;
   if (json) {
     nlohmann::json j = nlohmann::json::parse(summary_json(play.result));
