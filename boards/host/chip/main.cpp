@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "boards/host/chip/play.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -76,13 +76,7 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "folder for logs and picture")->capture_default_str();
   app.add_flag("--json", json, "the summary as JSON on standard output");
   try {
-    app.parse(argc, argv);
-    return run(scene, overrides, elf, out, json);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const wire::pc::UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
+    return wire::pc::run_program(app, argc, argv, [&] { return run(scene, overrides, elf, out, json); });
   } catch (const std::runtime_error& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;
