@@ -69,6 +69,7 @@ struct Bins {
   double noisy_share = 1;  // of the heat's noise by it: what speed does not take away
   std::vector<std::string> notes;
 
+  std::size_t bin_at(double s) const { return static_cast<std::size_t>(s / width_s + 1e-9); }  // the later at a limit
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 

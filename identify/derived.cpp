@@ -39,7 +39,7 @@ std::size_t rows_at_rest(const Log& log) {
   const std::size_t rows = log.of(Role::time).size();
   double most = 0;
   for (std::size_t i = 0; i < rows; ++i) most = std::max(most, heat(i));
-  const double least_rad_per_s = 0.02 * largest_magnitude(log.of(Role::speed));  // as bins.cpp takes it for idle
+  const double least_rad_per_s = idle_speed_share * largest_magnitude(log.of(Role::speed));
   const auto turns = [&](std::size_t i) {
     return log.has(Role::speed) && std::abs(log.of(Role::speed)[i]) > least_rad_per_s;
   };
@@ -52,7 +52,7 @@ std::size_t rows_at_rest(const Log& log) {
     if (!told && t[i] - told_s > untold_s) break;
     if (!told) continue;
     told_s = t[i];
-    running = heat(i) > 1e-3 * most ? running + 1 : 0;
+    running = heat(i) > idle_heat_share * most ? running + 1 : 0;
     if (running == 3) break;
     if (running == 0) rest = i + 1;
   }
