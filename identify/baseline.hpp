@@ -19,9 +19,6 @@ Fit closest(const Problem& problem, const Fit& two_resistors);
 void judge_baseline(const Problem& problem, const Fit& fit, double judged_ratio, const std::vector<Log>& logs,
                     const std::optional<wire::pc::MotorFile>& motor, Report& report);
 
-/// Errors over all logs, K; `each`: of every log as well.
-Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
-
 /// Appends what was measured and what this fit simulates, log by log.
 void add_plots(const Problem& problem, const Fit& fit, const std::string& remark, Report& report);
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
 #include "identify/leeway.hpp"
 #include "identify/parallel.hpp"
@@ -38,8 +37,7 @@ double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen,
   const Problem first = first_part(problem, veto_share);
   const Fit f = fit(first, chosen, {&warm});
   if (!f.valid()) return 1e300;
-  const Rmse e = rmse_of(last_part(problem, veto_share), f);
-  return std::isnan(e.core_K) ? e.housing_K : e.core_K;
+  return rmse_of(last_part(problem, veto_share), f).judged_K();
 }
 
 std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}", fmt::join(names_of(chosen), " + ")); }
