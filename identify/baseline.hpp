@@ -12,7 +12,7 @@ Fit fit_baseline(const Problem& problem);
 /// The same as near to the readings as least squares in kelvins comes, winding and housing counted alike: where something
 /// is missing, a fit that averages over slow noise and leeway misses by more than two resistors need to, and what was
 /// found is to be compared with the best that they can do.
-Fit closest(const Problem& problem, const Fit& two_resistors);
+Fit closest(const Problem& problem, const Fit& baseline);
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots) from `fit`.
 /// `judged_ratio`: of what the search saw it leave to the noise, beside what no motor is without; 0: no search.

@@ -74,10 +74,10 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   Disturbance out{problem.noise, 0, own};
   for (const std::vector<Disturbance>& larger : tried) {
     for (const Disturbance& d : larger) {
-      if (d.evidence > out.evidence) out = d;
-      // A slower one counts where its smallest is near: taken at any size three tests failed (SlowSearch.WhereNoRest...,
-      // SlowSearch.WhereQuietSensors..., SlowTraction.WhereNothingExplains...).
-      if (d.evidence < out.evidence - past_top) break;
+      if (d.joint_evidence > out.joint_evidence) out = d;
+      // A slower one counts where its smallest is near: taken at any size three tests failed
+      // (SlowSearch.WhereNoRest..., SlowSearch.WhereQuietSensors..., SlowTraction.WhereNothingExplains...).
+      if (d.joint_evidence < out.joint_evidence - past_top) break;
     }
   }
   return out;
@@ -134,7 +134,7 @@ bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {
       before = reached;
     }
   }
-  if (!(most > own + worth) || !(most > disturbance_of(problem, best).evidence + worth)) return false;
+  if (!(most > own + worth) || !(most > disturbance_of(problem, best).joint_evidence + worth)) return false;
   problem.noise = likeliest;
   return true;
 }

@@ -193,9 +193,9 @@ TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
   const auto refusal = [&] {
     const auto logs = tests::bench_logs({options});
     const auto problem = identify::problem_of(logs, motor);
-    identify::Search found;
+    identify::Found found;
     found.verdict = identify::Verdict::unknown_cause;
-    found.base.fit = found.chosen.fit = identify::fit(problem, {});
+    found.baseline.fit = found.chosen.fit = identify::fit(problem, {});
     return identify::too_sparse(problem, found, logs);
   };
   EXPECT_EQ(refusal(), "");
@@ -289,9 +289,9 @@ TEST(SlowBadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsT
     out.fit = identify::fit(problem, {{identify::cause_named(id)}});
     return out;
   };
-  identify::Search found;
+  identify::Found found;
   found.verdict = identify::Verdict::explained;
-  found.two_resistors = found.base.fit = identify::fit(problem, {});
+  found.plain_baseline = found.baseline.fit = identify::fit(problem, {});
   found.singles = {fitted("sensor_offset")};
   found.chosen = found.singles.front();
   EXPECT_NE(identify::suspicion(problem, found, logs, std::nullopt).find("the two columns are swapped"),

@@ -59,7 +59,7 @@ Hidden hidden(const std::vector<std::string>& effects, std::uint64_t seed, tests
   return hidden(o);
 }
 
-bool names(const identify::Search& s) { return identify::names_causes(s.verdict); }
+bool names(const identify::Found& s) { return identify::names_causes(s.verdict); }
 
 /// `otherwise`: what it was called before.
 void expect_named(const tests::HiddenLogOptions& o, const char* otherwise) {
@@ -99,7 +99,7 @@ TEST(SlowSearch, AStandingRotorsUnevenPhasesNeedNoName) {
   const identify::Chosen stall{identify::cause_named("stall_imbalance"), -1};
   const auto gained = [&](const Problem& problem) {
     for (const auto& single : identify::search(problem).singles)
-      if (single.fit.chosen.front() == stall) return single.gain;
+      if (single.fit.chosen.front() == stall) return single.evidence;
     return std::nan("");
   };
   tests::HiddenLogOptions stalls{
@@ -343,7 +343,7 @@ TEST(SlowSearch, WithoutASheetAWindingThatIsKnownIsNotMovedToGoWithACoolingThatI
 }
 
 /// A current as a chip reads it from the field it makes: noisy, a tenth of its rms. `fan`: speed goes with it.
-identify::Search of_a_noisy_current(const tests::HiddenLogOptions& o, bool fan) {
+identify::Found of_a_noisy_current(const tests::HiddenLogOptions& o, bool fan) {
   Hidden log = hidden(o);
   auto &current = log.logs[0].of(identify::Role::current), &speed = log.logs[0].of(identify::Role::speed);
   double mean2 = 0;
@@ -391,7 +391,7 @@ tests::BenchOptions told_by_resistance(std::uint64_t seed) {
   return o;
 }
 
-identify::Search found_in(std::initializer_list<tests::BenchOptions> each) {
+identify::Found found_in(std::initializer_list<tests::BenchOptions> each) {
   const auto logs = tests::bench_logs(each);
   EXPECT_GE(logs[0].core_reference.readings, 3u);
   return identify::search(identify::problem_of(logs, tests::ec_16()));
@@ -453,7 +453,7 @@ TEST(SlowSearch, WithoutASheetCausesStartFromAUsualMotorAsWell) {
 
 TEST(Experiment, StaysWithinTheMotorsLimits) {
   const Hidden log = hidden({"radiation"}, 4242);
-  identify::Search tie;
+  identify::Found tie;
   tie.verdict = Verdict::ambiguous;
   for (const char* id : {"radiation", "natural_convection"}) {
     identify::Candidate c;
@@ -610,7 +610,7 @@ TEST(SlowSearch, TheBaselineDoesNotStayInAPoorValley) {
   fast_winding.seed = 3115000;
   const auto found = identify::search(hidden(fast_winding).problem);
   EXPECT_EQ(found.verdict, Verdict::adequate);
-  EXPECT_LT(found.singles.front().gain, 3) << "25 before the four started again";
+  EXPECT_LT(found.singles.front().evidence, 3) << "25 before the four started again";
 }
 
 TEST(SlowSearch, NoCauseStaysInAPoorValleyThatTwoResistorsHaveLeft) {
@@ -620,7 +620,7 @@ TEST(SlowSearch, NoCauseStaysInAPoorValleyThatTwoResistorsHaveLeft) {
   EXPECT_EQ(found.tied.front(), std::vector<std::string>{"board_heat"})
       << "two others, where fifteen times what is typical counts as impossible";
   for (const identify::Candidate& single : found.singles)
-    EXPECT_GT(single.gain, -20) << identify::names_of(single.fit.chosen).front() << "; seven had -578 to -625";
+    EXPECT_GT(single.evidence, -20) << identify::names_of(single.fit.chosen).front() << "; seven had -578 to -625";
 }
 
 TEST(Search, WindingAndHousingAreNotExchangedWhereTheSheetIsFarOff) {
