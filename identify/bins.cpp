@@ -59,7 +59,8 @@ double reading_noise(const std::vector<double>& v) {
     std::copy_if(second.begin(), second.end(), std::back_inserter(moved), [](double d) { return d > 0; });
     middle = moved.empty() ? 0 : median(moved);
   }
-  const double most = 5 * middle / 0.6745;
+  constexpr double middle_of_normal = 0.6745;  // the median of its size, in standard deviations
+  const double most = 5 * middle / middle_of_normal;
   double sum = 0;
   for (const double d : second) sum += std::min(d, most) * std::min(d, most);
   return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));

@@ -11,6 +11,9 @@ namespace identify {
 namespace {
 
 constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: the moment between two rows
+/// A winding's own noise is taken from so many of its residuals at least, and within these.
+constexpr double least_core_white_K = 0.5, most_core_white_K = 3;
+constexpr int enough_core_readings = 10;
 
 /// What no model of a few nodes follows, as a share of the housing's rise, slow. A housing believed to the hundredths
 /// of a kelvin that its sensor wanders by outvotes a winding read twice a minute: of a motor recorded in host-sim
@@ -100,7 +103,8 @@ void refine_core_noise(Problem& problem, const Fit& best) {
       if (!std::isnan(own_K)) sum += own_K * own_K, ++n;
     }
   }
-  if (n >= 10) problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), 0.5, 3.0);
+  if (n >= enough_core_readings)
+    problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), least_core_white_K, most_core_white_K);
 }
 
 void refine_housing_noise(Problem& problem, const Fit& best) {

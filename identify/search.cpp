@@ -48,6 +48,9 @@ std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}",
 /// and 880).
 constexpr double doubted = 2;
 
+/// So much farther off on what a veto is tried on, a pair spoils what is to come.
+constexpr double spoilt = 1.1;
+
 /// Why the best pair is not believed; empty when it is. `counted`: a slow disturbance counts as noise already, and is
 /// no rival any more.
 std::string why_no_pair(const Problem& problem, bool counted, const Field& field, const Margins& margins) {
@@ -80,7 +83,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
   const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
   const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
-  if (!counted && more_K > 1.1 * fewer_K && disturbance_of(problem, pair.fit).evidence > margins.remains)
+  if (!counted && more_K > spoilt * fewer_K && disturbance_of(problem, pair.fit).evidence > margins.remains)
     return fmt::format(
         "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
         more_K, first, fewer_K);
