@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "wire/motor.hpp"
 #include "wire/pc/toml_file.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -56,14 +57,14 @@ std::string sheet_of(const Values& values, const std::string& name) {
       "name = \"{}\"\nsource = \"the parameters in force on the board\"\n"
       "terminal_resistance_ohm = {:.9g}\nterminal_inductance_mH = {:.9g}\ntorque_constant_mNm_per_A = {:.9g}\n"
       "pole_pairs = {}\nrotor_inertia_gcm2 = 1.0  # not a board's parameter, and nothing of heat depends on it\n"
-      // Amplitude i heats like sqrt(3)/2 i of direct current (wire/motor.hpp).
       "rated_current_A = {:.9g}\nR1_K_per_W = {:.9g}\nR2_K_per_W = {:.9g}\ntau_winding_s = {:.9g}\ntau_motor_s = "
       "{:.9g}\n"
       "winding_max_degC = {:.9g}\ncopper_coefficient_per_K = {:.9g}\n",
       name, 2 * get("phase_resistance_ohm"), 2e3 * get("inductance_d_H"),
-      1e3 * std::sqrt(3.0) * pole_pairs * get("flux_linkage_Wb"), pole_pairs, continuous_A(values) * std::sqrt(3.0) / 2,
-      get("R1_K_per_W"), get("R2_K_per_W"), get("R1_K_per_W") * get("C1_J_per_K"),
-      get("R2_K_per_W") * get("C2_J_per_K"), get("winding_max_degC"), get("copper_coefficient_per_K"));
+      1e3 * std::sqrt(3.0) * pole_pairs * get("flux_linkage_Wb"), pole_pairs,
+      continuous_A(values) * wire::direct_per_amplitude, get("R1_K_per_W"), get("R2_K_per_W"),
+      get("R1_K_per_W") * get("C1_J_per_K"), get("R2_K_per_W") * get("C2_J_per_K"), get("winding_max_degC"),
+      get("copper_coefficient_per_K"));
 }
 
 Values parameters_of_model(const std::string& path, std::string& why) {

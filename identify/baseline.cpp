@@ -19,14 +19,6 @@ constexpr Scale base_scales[] = {Scale::core_resistance, Scale::sink_resistance,
 // A parameter known worse than this (as a factor of e^0.35, about 40 %) is the sheet's word and not the data's.
 constexpr double determined_sd = 0.35;
 
-double root_mean(double a, double na, double b, double nb) { return std::sqrt((a * a * na + b * b * nb) / (na + nb)); }
-
-Error joined(const Error& a, const Error& b) {
-  if (a.readings == 0) return b;
-  if (b.readings == 0) return a;
-  return {root_mean(a.rms_K, a.readings, b.rms_K, b.readings), std::max(a.worst_K, b.worst_K), a.readings + b.readings};
-}
-
 std::string in_words(const Loose& loose) {
   std::string product;
   for (int j = 0; j < base_count; ++j) {
@@ -38,18 +30,6 @@ std::string in_words(const Loose& loose) {
 }
 
 }  // namespace
-
-Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
-  Error housing{missing, missing, 0}, core{missing, missing, 0};
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed r = replayed(problem, f, l);
-    const Error h = error_of(r.housing_residual_K), c = error_of(r.core_residual_K);
-    if (each != nullptr) each->push_back({h.rms_K, c.rms_K, h.worst_K, c.worst_K});
-    housing = joined(housing, h);
-    core = joined(core, c);
-  }
-  return {housing.rms_K, core.rms_K, housing.worst_K, core.worst_K};
-}
 
 void add_plots(const Problem& problem, const Fit& f, const std::string& remark, Report& report) {
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
@@ -155,25 +135,18 @@ Fit fit_baseline(const Problem& problem) {
   return f;
 }
 
-Fit closest(const Problem& problem, const Fit& two_resistors) {
-  Error housing{missing, missing, 0}, core{missing, missing, 0};
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed r = replayed(problem, two_resistors, l);
-    housing = joined(housing, error_of(r.housing_residual_K));
-    core = joined(core, error_of(r.core_residual_K));
+Fit closest(const Problem& problem, const Fit& baseline) {
+  int housing = 0, core = 0;  // readings
+  for (const Bins& log : problem.logs) {
+    for (const Bin& bin : log.bins) housing += bin.housing_n > 0, core += bin.core_n > 0;
   }
   Problem plain = problem;
   plain.leeway.clear();
   constexpr double each_K = 1;  // a minute of readings outweighs what is believed of a motor
   plain.noise = {.housing_white_K = each_K, .housing_slow_K = 0, .core_white_K = each_K};
-  if (core.readings > 0 && housing.readings > 0)
-    plain.noise.core_white_K *= std::sqrt(static_cast<double>(core.readings) / housing.readings);
-  const Fit found = fit(plain, {}, {&two_resistors});
-  const auto missed_K = [&](const Fit& f) {
-    const Rmse e = rmse_of(problem, f);
-    return std::isnan(e.core_K) ? e.housing_K : e.core_K;
-  };
-  if (!found.valid() || !(missed_K(found) < missed_K(two_resistors))) return two_resistors;
+  if (core > 0 && housing > 0) plain.noise.core_white_K *= std::sqrt(static_cast<double>(core) / housing);
+  const Fit found = fit(plain, {}, {&baseline});
+  if (!found.valid() || !(rmse_of(problem, found).judged_K() < rmse_of(problem, baseline).judged_K())) return baseline;
   Fit out = fit(problem, {}, {&found}, 0);  // there, as unsure as the noise leaves it
   out.uneven_per_A2 = found.uneven_per_A2;
   out.settled = found.settled;

@@ -12,15 +12,12 @@ Fit fit_baseline(const Problem& problem);
 /// The same as near to the readings as least squares in kelvins comes, winding and housing counted alike: where something
 /// is missing, a fit that averages over slow noise and leeway misses by more than two resistors need to, and what was
 /// found is to be compared with the best that they can do.
-Fit closest(const Problem& problem, const Fit& two_resistors);
+Fit closest(const Problem& problem, const Fit& baseline);
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots) from `fit`.
 /// `judged_ratio`: of what the search saw it leave to the noise, beside what no motor is without; 0: no search.
 void judge_baseline(const Problem& problem, const Fit& fit, double judged_ratio, const std::vector<Log>& logs,
                     const std::optional<wire::pc::MotorFile>& motor, Report& report);
-
-/// Errors over all logs, K; `each`: of every log as well.
-Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
 
 /// Appends what was measured and what this fit simulates, log by log.
 void add_plots(const Problem& problem, const Fit& fit, const std::string& remark, Report& report);

@@ -59,7 +59,8 @@ double reading_noise(const std::vector<double>& v) {
     std::copy_if(second.begin(), second.end(), std::back_inserter(moved), [](double d) { return d > 0; });
     middle = moved.empty() ? 0 : median(moved);
   }
-  const double most = 5 * middle / 0.6745;
+  constexpr double middle_of_normal = 0.6745;  // the median of its size, in standard deviations
+  const double most = 5 * middle / middle_of_normal;
   double sum = 0;
   for (const double d : second) sum += std::min(d, most) * std::min(d, most);
   return second.empty() ? 0 : std::sqrt(sum / (6 * static_cast<double>(second.size())));
@@ -217,7 +218,7 @@ void add_ahead(Bins& out, const Log& log, const Inputs& in) {
   double integral = 0;  // since the bin began
   std::size_t now = 0;
   for (std::size_t i = 0; i < t.size(); ++i) {
-    const auto b = static_cast<std::size_t>(t[i] / out.width_s + 1e-9);
+    const std::size_t b = out.bin_at(t[i]);
     if (b >= out.bins.size()) break;
     const double into_s = std::max(0.0, t[i] - out.width_s * static_cast<double>(b));
     if (b != now) integral = i > 0 ? heat(i - 1) * into_s : 0;
@@ -258,7 +259,7 @@ void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in, dou
     const double end = i + 1 < t.size() ? t[i + 1] : t[i] + usual_s;
     const bool pauses = i + 1 < t.size() && resumes(log, t[i], t[i + 1]);
     double from = t[i];
-    for (auto b = static_cast<std::size_t>(from / out.width_s + 1e-9); b < out.bins.size() && from < end; ++b) {
+    for (std::size_t b = out.bin_at(from); b < out.bins.size() && from < end; ++b) {
       const double held = pauses && from > t[i] ? 0 : 1;  // for the rest of its bin: what flows in a pause is not known
       const double to = std::min(end, out.width_s * static_cast<double>(b + 1));
       const double share = std::max(0.0, to - from) / out.width_s;
@@ -299,7 +300,7 @@ double first_reading(const Bins& log, double Bin::*reading, std::size_t from, st
 
 void find_starts(Bins& out, const Log& log) {
   for (const double s : log.resumes_s) {
-    const auto bin = static_cast<std::size_t>(s / out.width_s + 1e-9);
+    const std::size_t bin = out.bin_at(s);
     if (bin <= out.starts.back().bin || bin >= out.bins.size()) continue;
     const auto& t = log.of(Role::time);
     const double told_s = *std::prev(std::lower_bound(t.begin(), t.end(), s)) + out.interval_s;
@@ -324,12 +325,11 @@ void find_idle(Bins& out) {
     most_heat = std::max(most_heat, heat(bin));
     most_speed = std::max(most_speed, bin.input[Drive::speed_rad_per_s]);
   }
-  // One part in a thousand of the peak heat, a sensor's offset, does not end an idle stretch; nor does its noise, nor a
-  // fiftieth of the top speed: of what goes by its square that is less than a thousandth as well.
+  // Nor does a sensor's noise end an idle stretch.
   const double noise_A2 = out.has_power ? 0 : out.current_noise_A * out.current_noise_A;
-  const double least_heat = std::max(1e-3 * most_heat, 4 * noise_A2);
+  const double least_heat = std::max(idle_heat_share * most_heat, 4 * noise_A2);
   for (Bin& bin : out.bins)
-    bin.idle = heat(bin) <= least_heat && bin.input[Drive::speed_rad_per_s] <= 0.02 * most_speed + 1e-9;
+    bin.idle = heat(bin) <= least_heat && bin.input[Drive::speed_rad_per_s] <= idle_speed_share * most_speed + 1e-9;
 }
 
 }  // namespace

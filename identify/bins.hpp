@@ -21,7 +21,7 @@
 namespace identify {
 
 /// Amplitude of the current vector over the direct current that heats alike.
-inline const double amplitude_per_direct = 2 / std::sqrt(3.0);
+inline constexpr double amplitude_per_direct = 1 / wire::direct_per_amplitude;
 inline constexpr double stalled_rad_per_s = 2;  // about three seconds a turn
 inline constexpr double longest_bin_s = 2;      // but of many hours under a slow winding (problem.cpp)
 
@@ -69,6 +69,7 @@ struct Bins {
   double noisy_share = 1;  // of the heat's noise by it: what speed does not take away
   std::vector<std::string> notes;
 
+  std::size_t bin_at(double s) const { return static_cast<std::size_t>(s / width_s + 1e-9); }  // the later at a limit
   double duration_s() const { return width_s * static_cast<double>(bins.size()); }
 };
 

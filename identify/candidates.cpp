@@ -21,16 +21,16 @@ constexpr std::size_t most_finished = 24;
 constexpr std::size_t least_look_bins = 2000;  // of twice as many, looks see every two as one
 constexpr std::size_t beam = 3;  // best singles whose partners start from every place, not only where they ended alone
 
-Candidate candidate(const Candidate& base, Fit f) {
+Candidate candidate(const Candidate& baseline, Fit f) {
   Candidate c;
-  c.gain = base.fit.surprise() - f.surprise();
+  c.evidence = baseline.fit.surprise() - f.surprise();
   c.ratio = f.ratio();
   c.fit = std::move(f);
   return c;
 }
 
 void sort(std::vector<Candidate>& list) {
-  std::sort(list.begin(), list.end(), [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  std::sort(list.begin(), list.end(), [](const Candidate& a, const Candidate& b) { return a.evidence > b.evidence; });
 }
 
 /// Two causes that claim the same slot of the model cannot both be applied. And a current that one log scales otherwise
@@ -96,50 +96,51 @@ bool is_shorter(const Problem& rough, const Problem& problem) {
 
 /// Every cause alone, best first: from where it was or two resistors are, and from the sheet, since both may be bent
 /// into a poor valley by what is missing. Of a long log those far behind are left as its longer bins show them.
-std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& base,
+std::vector<Candidate> singles_of(const Problem& problem, const std::vector<Chosen>& all, const Candidate& baseline,
                                   const std::vector<Candidate>& before) {
-  const Problem rough = coarse(problem, base.fit);
+  const Problem rough = coarse(problem, baseline.fit);
   const bool shorter = is_shorter(rough, problem);
-  Candidate rough_base = base;
-  if (shorter) rough_base.fit = fit(rough, {}, {&base.fit});
+  Candidate rough_baseline = baseline;
+  if (shorter) rough_baseline.fit = fit(rough, {}, {&baseline.fit});
   std::vector<Fit> fits(all.size());
   in_parallel(all.size(), [&](std::size_t i) {
     const std::vector<Chosen> alone = {all[i]};
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const Candidate& b) { return b.fit.chosen == alone; });
-    fits[i] = fit(rough, alone, {known == before.end() ? &base.fit : &known->fit});
+    fits[i] = fit(rough, alone, {known == before.end() ? &baseline.fit : &known->fit});
     Fit anew = fit(rough, alone);
     if (anew.cost < fits[i].cost) fits[i] = std::move(anew);
-    if (fits[i].cost < rough_base.fit.cost + 1) return;
-    Fit beside = fit(rough, alone, {&rough_base.fit});  // where it was is a poor valley by now
+    if (fits[i].cost < rough_baseline.fit.cost + 1) return;
+    Fit beside = fit(rough, alone, {&rough_baseline.fit});  // where it was is a poor valley by now
     if (beside.cost < fits[i].cost) fits[i] = std::move(beside);
   });
   std::erase_if(fits, [](const Fit& f) { return !f.valid(); });
   double most = 0;
-  for (const Fit& f : fits) most = std::max(most, rough_base.fit.surprise() - f.surprise());
+  for (const Fit& f : fits) most = std::max(most, rough_baseline.fit.surprise() - f.surprise());
   // Where the winding bends within such a bin, a short delay is lost in it.
-  const Physical motor = physical(base.fit.x);
+  const Physical motor = physical(baseline.fit.x);
   const bool bends = rough.logs.front().width_s > motor.R1_K_per_W * motor.C1_J_per_K / 4;
   std::vector<Candidate> out(fits.size());
   in_parallel(fits.size(), [&](std::size_t i) {
-    out[i] = candidate(rough_base, std::move(fits[i]));
+    out[i] = candidate(rough_baseline, std::move(fits[i]));
     if (!shorter) return;
     const std::vector<Chosen> chosen = out[i].fit.chosen;
     Fit whole;
-    if (out[i].gain >= most - look_errs - look_errs_share * most) whole = fit(problem, chosen, {&out[i].fit});
+    if (out[i].evidence >= most - look_errs - look_errs_share * most) whole = fit(problem, chosen, {&out[i].fit});
     if (bends && cause_of(chosen.front()).edit == Edit::delay) {
-      const Fit prompt = with_cause(base.fit, cause_of(chosen.front()).id, {0.0});
+      const Fit prompt = with_cause(baseline.fit, cause_of(chosen.front()).id, {0.0});
       Fit late = fit(problem, chosen, {&prompt});
       if (late.cost < whole.cost) whole = std::move(late);
     }
-    if (whole.valid()) out[i] = candidate(base, std::move(whole));
+    if (whole.valid()) out[i] = candidate(baseline, std::move(whole));
   });
   sort(out);
   return out;
 }
 
 /// The pairs that may come near the best one, fitted to the end, best first.
-std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, const std::vector<Candidate>& singles) {
+std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& baseline,
+                                const std::vector<Candidate>& singles) {
   if (singles.empty()) return {};
   struct Pair {
     std::vector<Chosen> set;
@@ -179,7 +180,7 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
 
   double best = 1e300, more = 0;  // what all bins surprise more than the rough ones, as the best shows
   const auto worth_it = [&](std::size_t i) {
-    const double errs = std::max(look_errs, look_errs_share * (base.fit.surprise() - best));
+    const double errs = std::max(look_errs, look_errs_share * (baseline.fit.surprise() - best));
     return i < std::min(most_finished, looks.size()) && (i == 0 || hoped(looks[i]) + more <= best + errs);
   };
   std::vector<Candidate> out;
@@ -195,7 +196,7 @@ std::vector<Candidate> pairs_of(const Problem& problem, const Candidate& base, c
         best = next[i].surprise();
         if (shorter) more = best - looks[done + i].surprise();
       }
-      out.push_back(candidate(base, std::move(next[i])));
+      out.push_back(candidate(baseline, std::move(next[i])));
     }
   }
   sort(out);
@@ -221,8 +222,8 @@ void start_singles_again(const Problem& problem, Field& field) {
   in_parallel(all.size(), [&](std::size_t i) { all[i].fit = fit(problem, all[i].alone->fit.chosen, {all[i].both}); });
   for (Again& again : all) {
     if (!again.fit.valid()) continue;
-    Candidate anew = candidate(field.base, std::move(again.fit));
-    if (anew.gain > again.alone->gain) *again.alone = std::move(anew);
+    Candidate anew = candidate(field.baseline, std::move(again.fit));
+    if (anew.evidence > again.alone->evidence) *again.alone = std::move(anew);
   }
   sort(field.singles);
 }
@@ -269,23 +270,23 @@ std::vector<Chosen> available(const Problem& problem, const std::vector<std::str
 }
 
 void fit_alone(const Problem& problem, const std::vector<Chosen>& all, Field& field) {
-  Candidate base;
-  base.fit = field.base.fit.valid() ? fit(problem, {}, {&field.base.fit}) : fit(problem, {});
-  // An unseen winding under one cycle has valleys without number: a base that is stuck in one makes a cause of the
+  Candidate baseline;
+  baseline.fit = field.baseline.fit.valid() ? fit(problem, {}, {&field.baseline.fit}) : fit(problem, {});
+  // An unseen winding under one cycle has valleys without number: a baseline that is stuck in one makes a cause of the
   // rest.
-  if (base.fit.valid()) {
-    const Fit near = closest(problem, base.fit);
+  if (baseline.fit.valid()) {
+    const Fit near = closest(problem, baseline.fit);
     Fit other = fit(problem, {}, {&near});
-    if (other.cost < base.fit.cost) base.fit = std::move(other);
+    if (other.cost < baseline.fit.cost) baseline.fit = std::move(other);
   }
-  base.ratio = base.fit.ratio();
-  field.base = std::move(base);
-  if (!field.base.fit.valid()) return field.singles.clear();
-  field.singles = singles_of(problem, all, field.base, field.singles);
+  baseline.ratio = baseline.fit.ratio();
+  field.baseline = std::move(baseline);
+  if (!field.baseline.fit.valid()) return field.singles.clear();
+  field.singles = singles_of(problem, all, field.baseline, field.singles);
 }
 
 void fit_pairs(const Problem& problem, Field& field) {
-  field.pairs = pairs_of(problem, field.base, field.singles);
+  field.pairs = pairs_of(problem, field.baseline, field.singles);
   start_singles_again(problem, field);
 }
 
@@ -310,14 +311,14 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
   }
   const Problem rough = coarse(problem, best.fit);
   const bool shorter = is_shorter(rough, problem);
-  const double near = fit(rough, best.fit.chosen, {&best.fit}).surprise() + look_errs + look_errs_share * best.gain;
+  const double near = fit(rough, best.fit.chosen, {&best.fit}).surprise() + look_errs + look_errs_share * best.evidence;
   in_parallel(all.size(), [&](std::size_t i) {
     Neighbour& n = all[i];
     n.fit = fit(rough, n.pair, {&best.fit, n.other});
     if (shorter) n.fit = n.fit.valid() && n.fit.surprise() < near ? fit(problem, n.pair, {&n.fit}) : Fit{};
   });
   for (Neighbour& n : all) {
-    if (n.fit.valid()) sets.push_back(candidate(field.base, std::move(n.fit)));
+    if (n.fit.valid()) sets.push_back(candidate(field.baseline, std::move(n.fit)));
   }
   sort(sets);
 }
@@ -325,8 +326,8 @@ void add_neighbours(const Problem& problem, const Field& field, std::vector<Cand
 Fit best_alone(const Problem& problem) {
   Field field;
   fit_alone(problem, available(problem, {}), field);
-  const bool better = !field.singles.empty() && field.singles.front().gain > 0;
-  return better ? field.singles.front().fit : field.base.fit;
+  const bool better = !field.singles.empty() && field.singles.front().evidence > 0;
+  return better ? field.singles.front().fit : field.baseline.fit;
 }
 
 }  // namespace identify

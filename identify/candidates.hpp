@@ -14,8 +14,8 @@ namespace identify {
 
 struct Candidate {
   Fit fit;
-  double gain = 0;   // twice the logarithm of its evidence over the baseline's
-  double ratio = 0;  // rms of whitened residuals, both channels
+  double evidence = 0;  // twice its logarithm, over the baseline's
+  double ratio = 0;     // rms of whitened residuals, both channels
   bool chosen = false;
   bool tied = false;    // as good as the best
   bool likely = false;  // a board must not take it for excluded: nearly as good; likelier than adequate two resistors
@@ -23,7 +23,7 @@ struct Candidate {
 
 /// Every cause alone and the pairs worth fitting, each best first, under the noise of the problem.
 struct Field {
-  Candidate base;
+  Candidate baseline;
   std::vector<Candidate> singles, pairs;
 };
 

@@ -28,7 +28,7 @@ bool holds(const std::vector<std::string>& ids, const std::string& id) {
 }
 
 /// Every cause once, best first, though a cause of one log was tried in each of them.
-std::vector<Rung> ladder_of(const Search& found) {
+std::vector<Rung> ladder_of(const Found& found) {
   std::vector<Rung> out;
   std::set<std::string> seen;
   for (const Candidate& c : found.singles) {
@@ -38,7 +38,7 @@ std::vector<Rung> ladder_of(const Search& found) {
     const bool tied =
         found.verdict == Verdict::ambiguous &&
         std::any_of(found.tied.begin(), found.tied.end(), [&](const auto& ids) { return holds(ids, id); });
-    const double shown = std::abs(c.gain) < 0.05 ? 0 : c.gain;  // what rounds to nothing has no sign
+    const double shown = std::abs(c.evidence) < 0.05 ? 0 : c.evidence;  // what rounds to nothing has no sign
     out.push_back({id, cause_of(c.fit.chosen.front()).name, shown, chosen, tied && !chosen});
   }
   return out;
@@ -46,22 +46,22 @@ std::vector<Rung> ladder_of(const Search& found) {
 
 /// What stands in a cause's place in the next best sets, and how far behind: all that tie, and the nearest three that
 /// are behind by what another log might bring.
-std::vector<Rival> rivals_of(const std::string& id, const Search& found) {
+std::vector<Rival> rivals_of(const std::string& id, const Found& found) {
   constexpr std::size_t most = 3;
   constexpr double near = 100;
   std::vector<Rival> out;
   for (const Candidate& c : found.sets) {
     const auto theirs = ids_of(c.fit.chosen);
-    if (holds(theirs, id) || (!c.tied && (out.size() >= most || found.chosen.gain - c.gain > near))) continue;
+    if (holds(theirs, id) || (!c.tied && (out.size() >= most || found.chosen.evidence - c.evidence > near))) continue;
     for (const std::string& other : theirs) {
       const bool known = std::any_of(out.begin(), out.end(), [&](const Rival& r) { return r.id == other; });
-      if (!known && !holds(found.tied.front(), other)) out.push_back({other, found.chosen.gain - c.gain});
+      if (!known && !holds(found.tied.front(), other)) out.push_back({other, found.chosen.evidence - c.evidence});
     }
   }
   return out;
 }
 
-void tell(const Problem& problem, const Search& found, Report& report) {
+void tell(const Problem& problem, const Found& found, Report& report) {
   report.verdict = found.verdict;
   if (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) report.tied = found.tied;
   report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
@@ -85,7 +85,7 @@ void tell(const Problem& problem, const Search& found, Report& report) {
     line.signature = cause.signature;
     line.easily_taken_for = cause.rivals;
     line.experiment = cause.experiment;
-    line.evidence = found.own_gain[i];
+    line.evidence = found.own_evidence[i];
     line.parameters = cause_lines(problem, f, i);
     line.rivals = rivals_of(cause.id, found);
     report.causes.push_back(std::move(line));
@@ -93,14 +93,14 @@ void tell(const Problem& problem, const Search& found, Report& report) {
 }
 
 /// A set that was found, by its ids.
-std::string in_words(const Search& found, const std::vector<std::string>& ids) {
+std::string in_words(const Found& found, const std::vector<std::string>& ids) {
   for (const Candidate& c : found.sets) {
     if ((c.chosen || c.tied) && ids_of(c.fit.chosen) == ids) return listed(names_of(c.fit.chosen), " and ");
   }
   return listed(ids, " and ");
 }
 
-std::string sentence(const Search& found, const Report& r) {
+std::string sentence(const Found& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   // Readings of the winding may be too noisy to show what the housing's do.
   constexpr double visible = 1.1;  // by a tenth
@@ -241,7 +241,7 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
 /// are nearly as good as the named one, and of two resistors and what is likelier by the log and only too little to be
 /// named, it gets the one that bears a push the shortest. Where nothing explains the log, no fit is worth more than a
 /// sheet.
-Offer for_the_board(const Problem& problem, const Search& found, const Fit& best, Report& report) {
+Offer for_the_board(const Problem& problem, const Found& found, const Fit& best, Report& report) {
   const bool unexplained = found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient;
   const thermal::Trust trust = trust_of(problem, best, unexplained ? thermal::sheet_trust : thermal::identified_trust);
   std::vector<Offer> open = {{&best, trust}};
@@ -265,7 +265,7 @@ Offer for_the_board(const Problem& problem, const Search& found, const Fit& best
 }
 
 /// Where no ambient was recorded, how warm the room was is a rival of what may be nothing else.
-void tell_that_a_room_is_assumed(const Problem& problem, const Search& found, Report& report) {
+void tell_that_a_room_is_assumed(const Problem& problem, const Found& found, Report& report) {
   const auto assumed = [](const Bins& log) { return log.sink_assumed; };
   if (found.verdict == Verdict::adequate || std::none_of(problem.logs.begin(), problem.logs.end(), assumed)) return;
   const std::string advice =
@@ -288,7 +288,7 @@ double rows_ahead(const Problem& problem, const Fit& f) {
 
 /// The search, and what speaks against answering by it.
 struct Judged {
-  Search found;
+  Found found;
   std::string poor;  // why there is no verdict; empty: there is one
   bool vetoed = false;
 };
@@ -307,7 +307,7 @@ Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::o
   if (poor.empty()) poor = clipped(found, logs);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
   if (!poor.empty() || !held_out || found.chosen.fit.chosen.empty()) return out;
-  const std::string refused = veto(problem, found.base.fit, found.chosen.fit);
+  const std::string refused = veto(problem, found.baseline.fit, found.chosen.fit);
   vetoed = !refused.empty();
   if (vetoed && found.verdict != Verdict::unknown_cause) {
     found.verdict = Verdict::unknown_cause;
@@ -327,8 +327,8 @@ Fit as_unsure_as_unseen(const Problem& problem, Fit f) {
 }
 
 /// All that is stated, or may be given to a board.
-void widen_along_ridges(const Problem& problem, Search& found) {
-  std::vector<Fit*> stated = {&found.base.fit, &found.chosen.fit};
+void widen_along_ridges(const Problem& problem, Found& found) {
+  std::vector<Fit*> stated = {&found.baseline.fit, &found.chosen.fit};
   for (std::vector<Candidate>* some : {&found.singles, &found.sets}) {
     for (Candidate& c : *some) {
       if (c.likely) stated.push_back(&c.fit);
@@ -445,7 +445,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Problem problem = problem_of(logs, motor);
   std::optional<Problem> unseen;
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
-  const Fit base = fit_baseline(problem);
+  const Fit first = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
   widen_along_ridges(problem, found);
@@ -455,11 +455,11 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   // more: of 33 such sets 8 did worse on another log (those of score's outside and removed rows, seeds 893 and 894).
   const bool near = poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty();
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
-  const Fit two = found.base.fit.valid() ? found.base.fit : base;
+  const Fit baseline = found.baseline.fit.valid() ? found.baseline.fit : first;
   const bool wrong = poor.empty() && found.verdict != Verdict::adequate;
-  const Fit compared = wrong ? as_unsure_as_unseen(problem, closest(problem, two)) : two;
-  judge_baseline(problem, compared, found.base.ratio, logs, motor, report);
-  const Fit& answer = extended ? found.chosen.fit : two;
+  const Fit compared = wrong ? as_unsure_as_unseen(problem, closest(problem, baseline)) : baseline;
+  judge_baseline(problem, compared, found.baseline.ratio, logs, motor, report);
+  const Fit& answer = extended ? found.chosen.fit : baseline;
   if (!poor.empty()) {
     report.verdict = found.verdict = Verdict::insufficient;
     report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
@@ -480,7 +480,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     // A heat that no longer depends on the winding, say, leaves R1 open.
     if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, answer);
     doing("playing a push on a board");
-    if (report.core_refusal.empty()) report.gain = gain_of(problem, two, *offer.fit);
+    if (report.core_refusal.empty()) report.gain = gain_of(problem, baseline, *offer.fit);
     if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
   }
   compare_with_sheet(problem, extended ? report.extended : report.baseline, report);
@@ -504,8 +504,8 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   report.no_model = why_no_model(problem, poor);
   if (!report.no_model.empty()) return report;
   report.model_toml = heat_set_toml(problem, *offer.fit, report.sentence, offer.trust);
-  report.baseline_toml =
-      heat_set_toml(problem, two, "The two-resistor model as fitted, without what was found.", trust_of(problem, two));
+  report.baseline_toml = heat_set_toml(problem, baseline, "The two-resistor model as fitted, without what was found.",
+                                       trust_of(problem, baseline));
   return report;
 }
 

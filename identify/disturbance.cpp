@@ -11,6 +11,9 @@ namespace identify {
 namespace {
 
 constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: the moment between two rows
+/// A winding's own noise is taken from so many of its residuals at least, and within these.
+constexpr double least_core_white_K = 0.5, most_core_white_K = 3;
+constexpr int enough_core_readings = 10;
 
 /// What no model of a few nodes follows, as a share of the housing's rise, slow. A housing believed to the hundredths
 /// of a kelvin that its sensor wanders by outvotes a winding read twice a minute: of a motor recorded in host-sim
@@ -74,10 +77,10 @@ Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed) {
   Disturbance out{problem.noise, 0, own};
   for (const std::vector<Disturbance>& larger : tried) {
     for (const Disturbance& d : larger) {
-      if (d.evidence > out.evidence) out = d;
-      // A slower one counts where its smallest is near: taken at any size three tests failed (Search.WhereNoRest...,
-      // Search.WhereQuietSensors..., Traction.WhereNothingExplains...).
-      if (d.evidence < out.evidence - past_top) break;
+      if (d.joint_evidence > out.joint_evidence) out = d;
+      // A slower one counts where its smallest is near: taken at any size three tests failed
+      // (SlowSearch.WhereNoRest..., SlowSearch.WhereQuietSensors..., SlowTraction.WhereNothingExplains...).
+      if (d.joint_evidence < out.joint_evidence - past_top) break;
     }
   }
   return out;
@@ -100,7 +103,8 @@ void refine_core_noise(Problem& problem, const Fit& best) {
       if (!std::isnan(own_K)) sum += own_K * own_K, ++n;
     }
   }
-  if (n >= 10) problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), 0.5, 3.0);
+  if (n >= enough_core_readings)
+    problem.noise.core_white_K = std::clamp(std::sqrt(sum / n), least_core_white_K, most_core_white_K);
 }
 
 void refine_housing_noise(Problem& problem, const Fit& best) {
@@ -134,7 +138,7 @@ bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {
       before = reached;
     }
   }
-  if (!(most > own + worth) || !(most > disturbance_of(problem, best).evidence + worth)) return false;
+  if (!(most > own + worth) || !(most > disturbance_of(problem, best).joint_evidence + worth)) return false;
   problem.noise = likeliest;
   return true;
 }

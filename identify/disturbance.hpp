@@ -12,8 +12,8 @@ namespace identify {
 /// likeliest. Where it gains much over the noise alone, the set leaves something that is not noise.
 struct Disturbance {
   Noise noise;
-  double gain = 0;      // over the noise alone
-  double evidence = 0;  // of the set with it; to compare sets that leave different disturbances
+  double evidence = 0;        // of it: over the noise alone
+  double joint_evidence = 0;  // of the set with it; to compare sets that leave different disturbances
 };
 
 Disturbance disturbance_of(const Problem& problem, const Fit& undisturbed);

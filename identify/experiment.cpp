@@ -136,7 +136,7 @@ void fill(Problem& trial, const Fit& truth) {
 }
 
 /// The sets that tie, but for those of one of several logs.
-std::vector<const Candidate*> tied_sets(const Search& found) {
+std::vector<const Candidate*> tied_sets(const Found& found) {
   std::vector<const Candidate*> out;
   for (const Candidate& c : found.sets) {
     const bool picks_a_log =
@@ -160,7 +160,7 @@ double least_apart(Problem& trial, const std::vector<const Candidate*>& tied) {
 
 }  // namespace
 
-std::optional<Experiment> experiment(const Problem& problem, const Search& found, double most_A) {
+std::optional<Experiment> experiment(const Problem& problem, const Found& found, double most_A) {
   if (found.verdict != Verdict::ambiguous || !problem.in_amperes()) return std::nullopt;
   const std::vector<const Candidate*> all = tied_sets(found);
   if (all.size() < 2) return std::nullopt;

@@ -17,7 +17,7 @@ namespace identify {
 /// Nothing when there is no tie, or when the log tells no amperes to ask for (but a power, or a torque without the
 /// motor's constant). The best three of the tied sets are told apart; every one keeps the winding 10 K below its limit,
 /// and no step asks for more than `most_A` (amplitude).
-std::optional<Experiment> experiment(const Problem& problem, const Search& found,
+std::optional<Experiment> experiment(const Problem& problem, const Found& found,
                                      double most_A = std::numeric_limits<double>::infinity());
 
 }  // namespace identify

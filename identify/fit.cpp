@@ -529,6 +529,14 @@ Fit lowest_valley(const Problem& problem, const std::vector<Chosen>& chosen, con
   return descend_from(best.x, most);
 }
 
+double root_mean(double a, double na, double b, double nb) { return std::sqrt((a * a * na + b * b * nb) / (na + nb)); }
+
+Error joined(const Error& a, const Error& b) {
+  if (a.readings == 0) return b;
+  if (b.readings == 0) return a;
+  return {root_mean(a.rms_K, a.readings, b.rms_K, b.readings), std::max(a.worst_K, b.worst_K), a.readings + b.readings};
+}
+
 }  // namespace
 
 int Fit::cause_coordinates() const { return coordinates_of(chosen); }
@@ -738,6 +746,20 @@ Error error_of(const std::vector<double>& residual_K) {
     ++n;
   }
   return n > 0 ? Error{std::sqrt(sum / n), worst, n} : Error{missing, missing, 0};
+}
+
+double Rmse::judged_K() const { return std::isnan(core_K) ? housing_K : core_K; }
+
+Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
+  Error housing{missing, missing, 0}, core{missing, missing, 0};
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Replayed r = replayed(problem, f, l);
+    const Error h = error_of(r.housing_residual_K), c = error_of(r.core_residual_K);
+    if (each != nullptr) each->push_back({h.rms_K, c.rms_K, h.worst_K, c.worst_K});
+    housing = joined(housing, h);
+    core = joined(core, c);
+  }
+  return {housing.rms_K, core.rms_K, housing.worst_K, core.worst_K};
 }
 
 double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,

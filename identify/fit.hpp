@@ -88,6 +88,15 @@ struct Error {
 };
 Error error_of(const std::vector<double>& residual_K);
 
+struct Rmse {
+  double housing_K = 0, core_K = 0;  // NaN: not measured
+  double housing_worst_K = 0, core_worst_K = 0;
+
+  double judged_K() const;  // the winding's where it is read
+};
+/// Errors over all logs, K; `each`: of every log as well.
+Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
+
 /// The base parameters in physical units.
 struct Physical {
   double R1_K_per_W, R2_K_per_W, C1_J_per_K, C2_J_per_K;

@@ -24,10 +24,10 @@ struct Block {
 };
 
 /// Of the winding where it is read, else of the housing.
-std::vector<Block> blocks_of(const Problem& problem, const Fit& base, const Fit& extended, bool winding) {
+std::vector<Block> blocks_of(const Problem& problem, const Fit& baseline, const Fit& extended, bool winding) {
   std::vector<Block> out;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed a = replayed(problem, base, l), b = replayed(problem, extended, l);
+    const Replayed a = replayed(problem, baseline, l), b = replayed(problem, extended, l);
     const auto& before = winding ? a.core_residual_K : a.housing_residual_K;
     const auto& after = winding ? b.core_residual_K : b.housing_residual_K;
     const auto length = static_cast<std::size_t>(std::max(1.0, std::ceil(block_s / problem.logs[l].width_s)));
@@ -104,10 +104,10 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore&
   return "";
 }
 
-void judge(const Problem& problem, const Fit& base, const Fit& extended, int draws, const Report& report,
+void judge(const Problem& problem, const Fit& baseline, const Fit& extended, int draws, const Report& report,
            HeldOutScore& out) {
   out.winding = problem.any_core();
-  const auto blocks = blocks_of(problem, base, extended, out.winding);
+  const auto blocks = blocks_of(problem, baseline, extended, out.winding);
   out.blocks = static_cast<int>(blocks.size());
   out.against = speaks_against(blocks, out, report);
   if (blocks.size() < least_blocks || draws < least_draws) return;
@@ -126,7 +126,7 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
   return out;
 }
 
-HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& baseline,
                             const Fit& extended, Report& report) {
   HeldOutScore out;
   Fit before, after;
@@ -134,7 +134,7 @@ HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const 
   if (held.fraction > 0) {
     out.how = fmt::format("the last {:.0f} % of each log", 100 * held.fraction);
     remark = " (the last part, not seen by the fit)";
-    before = carried_on(unseen, fitted, base);
+    before = carried_on(unseen, fitted, baseline);
     after = carried_on(unseen, fitted, extended);
     out.before = rmse_of(unseen, before);
   } else {
@@ -145,7 +145,7 @@ HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const 
     // What is of one of the fitted logs (a fan) is not of these.
     Fit elsewhere = extended;
     for (Chosen& c : elsewhere.chosen) c.log = -1;
-    before = transferred(unseen, base);
+    before = transferred(unseen, baseline);
     after = transferred(unseen, elsewhere);
     out.before = rmse_of(unseen, before, several ? &out.each_before : nullptr);
   }
@@ -156,12 +156,12 @@ HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const 
   return out;
 }
 
-std::string veto(const Problem& problem, const Fit& base, const Fit& extended) {
+std::string veto(const Problem& problem, const Fit& baseline, const Fit& extended) {
   const Problem first = first_part(problem, veto_share), last = last_part(problem, veto_share);
-  const Fit two = fit(first, {}, {&base}), more = fit(first, extended.chosen, {&extended});
-  if (!two.valid() || !more.valid()) return "";
-  auto blocks = blocks_of(last, two, more, problem.any_core());
-  if (blocks.size() < least_blocks) blocks = blocks_of(last, two, more, false);
+  const Fit before = fit(first, {}, {&baseline}), after = fit(first, extended.chosen, {&extended});
+  if (!before.valid() || !after.valid()) return "";
+  auto blocks = blocks_of(last, before, after, problem.any_core());
+  if (blocks.size() < least_blocks) blocks = blocks_of(last, before, after, false);
   if (blocks.size() < least_blocks) return "";
   const Resampled r = resampled(blocks, veto_draws);
   // A sixth of the draws lie more than a standard deviation below the middle.

@@ -19,11 +19,11 @@ Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const Hol
 
 /// Errors of both models on that, with a bootstrap interval over blocks of a minute. What was held out is added to
 /// the report's plots.
-HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& base,
+HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const HoldOut& held, const Fit& baseline,
                             const Fit& extended, Report& report);
 
 /// Why the extended model must not be believed: fitted to the first three quarters of each log it misses the last by
 /// more than the two-resistor model does, and by more than chance explains. Empty: it may.
-std::string veto(const Problem& problem, const Fit& base, const Fit& extended);
+std::string veto(const Problem& problem, const Fit& baseline, const Fit& extended);
 
 }  // namespace identify

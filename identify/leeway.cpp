@@ -94,14 +94,14 @@ Leeway lateness(const Run& prompt) {
   return out;
 }
 
-Leeway frame(const Run& two_resistors) {
-  const auto& [problem, motor] = two_resistors;
+Leeway frame(const Run& baseline) {
+  const auto& [problem, motor] = baseline;
   const Physical p = physical(motor.x);
   Fit framed = with_cause(motor, "third_mass",
                           {std::log(ordinary_frame_share_of_C2 * p.C2_J_per_K / problem.belief.C2_J_per_K),
                            std::log(ordinary_frame_share_of_R2 * p.R2_K_per_W / problem.belief.R2_K_per_W)});
   framed.x[3] += std::log(1 - ordinary_frame_share_of_C2);
-  return moved(two_resistors, {problem, framed});
+  return moved(baseline, {problem, framed});
 }
 
 Leeway uneven_phases(const Run& whole) {
@@ -193,14 +193,14 @@ Fit bare(const Fit& f) {
 }  // namespace
 
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
-  const Fit two_resistors = bare(motor);
+  const Fit baseline = bare(motor);
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
     return e == Edit::sensor_lag || e == Edit::sensor_share || e == Edit::delay || e == Edit::winding_lag;
   });
-  const Run whole{problem, motor}, prompt{problem, sensor ? two_resistors : motor};
-  std::vector<Leeway> out = {lateness(prompt), frame({problem, two_resistors})};
+  const Run whole{problem, motor}, prompt{problem, sensor ? baseline : motor};
+  std::vector<Leeway> out = {lateness(prompt), frame({problem, baseline})};
   if (problem.uneven_per_A2 > 0) out.push_back(uneven_phases(whole));
   if (problem.noise.core_slow_K > 0) out.insert(out.end(), {read_ahead(prompt), read_behind(prompt)});
   if (auto more = ripple(whole)) out.push_back(std::move(*more));
@@ -220,7 +220,7 @@ std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fi
   return out;
 }
 
-Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
+Leeway leeway_of_load(const Problem& problem, const Fit& baseline) {
   Problem bent = problem;
   double sum_A2 = 0, sum_A4 = 0;
   for (const Bins& log : problem.logs) {
@@ -236,7 +236,7 @@ Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors) {
       if (sum_A4 > 0) A2 *= 1 + ordinary_load_share * A2 * sum_A2 / sum_A4;
     }
   }
-  return moved({problem, two_resistors}, {bent, two_resistors});
+  return moved({problem, baseline}, {bent, baseline});
 }
 
 }  // namespace identify

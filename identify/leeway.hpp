@@ -26,6 +26,6 @@ std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fi
 
 /// Heat that goes otherwise with load than the recorded current's square says, as current sensors and sampling have it.
 /// A housing known to hundredths of a kelvin would take it for copper that warms otherwise, and so for another R1.
-Leeway leeway_of_load(const Problem& problem, const Fit& two_resistors);
+Leeway leeway_of_load(const Problem& problem, const Fit& baseline);
 
 }  // namespace identify

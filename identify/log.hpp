@@ -48,6 +48,10 @@ struct Log {
   bool has(Role r) const { return !of(r).empty(); }
 };
 
+/// Of the most of a log, what counts as nothing: of its heat a sensor's offset; of its speed less than a thousandth of
+/// what goes by the square.
+inline constexpr double idle_heat_share = 1e-3, idle_speed_share = 0.02;
+
 /// Does it go on, after a pause, between these times?
 bool resumes(const Log& log, double after_s, double until_s);
 

@@ -13,7 +13,7 @@
 #include "identify/score_logs.hpp"
 #include "wire/pc/files.hpp"
 #include "wire/pc/help.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -21,7 +21,6 @@ using identify::Log, identify::Verdict;
 using wire::pc::Exit;
 using wire::pc::refuse;
 using wire::pc::refuse_data;
-using wire::pc::UserError;
 
 constexpr const char* examples = R"(identify: what does the thermal simulation of this motor get wrong?
 
@@ -152,7 +151,7 @@ int answer(Arguments a) {
 
 int main(int argc, char** argv) {
   CLI::App app{examples};
-  app.formatter(std::make_shared<wire::pc::Help>());
+  wire::pc::use_help(app, "identify --help");
   Arguments a;
   app.add_option("LOG", a.logs, "CSV logs of one motor, fitted together")->required();
   app.add_option(
@@ -220,21 +219,8 @@ int main(int argc, char** argv) {
       "Exit codes: 0 an answer was given, whatever the verdict; 2 the command line or a file named in it is wrong; 3 "
       "the logs cannot be used, or not for the model that was to be written. With 2 and 3 one sentence on standard "
       "error says why.");
-  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
-    const std::string hint = wire::pc::nearest_option(*of);
-    return fmt::format("{}{} identify --help lists what there is.\n", error.what(), hint.empty() ? ";" : hint);
-  });
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? 0 : static_cast<int>(Exit::usage);
-  }
-  try {
-    return answer(a);
-  } catch (const UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
+    return wire::pc::run_program(app, argc, argv, [&] { return answer(a); });
   } catch (const std::exception& error) {
     fmt::print(stderr, "identify stopped: {}. This is a fault of the program; please report it with the log.\n",
                error.what());

@@ -161,7 +161,12 @@ void set_scales(Problem& problem) {
 /// Where a search begins is seen in no more, of ten hours in bins of 4.5 s: chosen for speed.
 constexpr std::size_t most_rough_bins = 8000;
 
-/// Time constants that motors have, with the rise that this log shows; a factor of ten either way.
+/// Time constants that housings of motors have, each with R1 over R2 small and large; a winding's is this share of its
+/// housing's. Believed to a factor of ten either way, e^9 at most.
+constexpr double guessed_housing_s[] = {120, 600, 2400}, guessed_R1_of_R2[] = {0.1, 0.6}, guessed_winding_share = 0.02;
+constexpr double guessed_log_sd = 2.3, guessed_log_room = 9;
+
+/// With the rise that this log shows.
 std::vector<Belief> guesses_of(const Problem& problem) {
   double rise_K = 1;
   for (const Bin& bin : problem.logs.front().bins) {
@@ -169,15 +174,15 @@ std::vector<Belief> guesses_of(const Problem& problem) {
     if (!std::isnan(T)) rise_K = std::max(rise_K, T - bin.input.boundary_degC[0]);
   }
   std::vector<Belief> out;
-  for (const double housing_s : {120.0, 600.0, 2400.0}) {
-    for (const double ratio : {0.1, 0.6}) {
+  for (const double housing_s : guessed_housing_s) {
+    for (const double ratio : guessed_R1_of_R2) {
       Belief b = problem.belief;
-      b.log_sd = 2.3;
-      b.log_room = 9;
+      b.log_sd = guessed_log_sd;
+      b.log_room = guessed_log_room;
       b.R2_K_per_W = rise_K / std::max(1e-9, problem.heat_W);
       b.R1_K_per_W = ratio * b.R2_K_per_W;
       b.C2_J_per_K = housing_s / b.R2_K_per_W;
-      b.C1_J_per_K = 0.02 * housing_s / b.R1_K_per_W;
+      b.C1_J_per_K = guessed_winding_share * housing_s / b.R1_K_per_W;
       out.push_back(b);
     }
   }
@@ -358,7 +363,8 @@ bool Problem::possible(const Cause& cause) const {
       for (const Bins& log : logs) {
         for (const Bin& bin : log.bins) n += 1, sum += bin.signed_A, square += bin.signed_A * bin.signed_A;
       }
-      return amps && n * square > 1.1 * sum * sum;
+      constexpr double varied = 1.1;  // a mean square over the square of the mean
+      return amps && n * square > varied * sum * sum;
     }
     case Needs::winding:  // a resistance is not late
       return any([](const Bins& b) { return b.has_core && b.core_reference.readings == 0; });

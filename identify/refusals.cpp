@@ -60,9 +60,9 @@ double heat_capacity_J_per_K(const Problem& problem, const Fit& f) {
 /// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
 /// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
 /// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
-std::string unlike_the_motor(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+std::string unlike_the_motor(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
-  for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     const double settles_s = physical(f->x).R2_K_per_W * heat_capacity_J_per_K(problem, *f);
     if (in_air && settles_s < 20 && determines_housing(problem, *f))
       return fmt::format(
@@ -112,8 +112,8 @@ Problem in_long_bins(Problem problem) {
 }
 
 /// What two resistors leave there.
-double left_in_a_look(const Problem& problem, const Search& found) {
-  return excess(fit(in_long_bins(problem), {}, {&found.two_resistors}));
+double left_in_a_look(const Problem& problem, const Found& found) {
+  return excess(fit(in_long_bins(problem), {}, {&found.plain_baseline}));
 }
 
 /// The logs with these columns read in this unit.
@@ -128,12 +128,12 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
 
 /// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
-std::string misread_columns(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+std::string misread_columns(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
   // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
   const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
-  const Fit& two = found.two_resistors;
-  const double as_it_stands = excess(two), by_one = left_by(found.singles.front().fit);
+  const Fit& plain = found.plain_baseline;
+  const double as_it_stands = excess(plain), by_one = left_by(found.singles.front().fit);
   const double in_a_look = left_in_a_look(problem, found);
   const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
     const Fit look = fit(in_long_bins(read), chosen);
@@ -162,7 +162,7 @@ std::string misread_columns(const Problem& problem, const Search& found, const s
   }
   // Both masses as large as they may be: a motor that answers far too slowly.
   const auto at_most = [&](Eigen::Index i, double believed) {
-    return two.at_bound[static_cast<std::size_t>(i)] && std::exp(two.x[i]) > believed;
+    return plain.at_bound[static_cast<std::size_t>(i)] && std::exp(plain.x[i]) > believed;
   };
   if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K) &&
       follows_better(read_in(*unit_named("ms"), {Role::time}, logs)))
@@ -209,10 +209,10 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 
 /// Of two clocks farther apart than a clock_delay may be: by how much the temperatures are late; 0: by none. Until they
 /// are put right, a motor that warms where nothing flows makes rest look noisy.
-double clocks_apart_s(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+double clocks_apart_s(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  double late_s = 0, least = fraction_left * excess(found.two_resistors);
+  double late_s = 0, least = fraction_left * excess(found.plain_baseline);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
   const double in_a_look = left_in_a_look(problem, found);
@@ -280,13 +280,13 @@ Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double>
 }
 
 /// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it.
-double left_open_K(const Problem& problem, const Fit& base, const std::vector<Log>& logs) {
+double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs) {
   const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
                 sooner = under(problem, logs, told_sooner);
   double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
-    const auto run = [&](const Problem& p) { return replayed(p, base, l).*of; };
+    const auto run = [&](const Problem& p) { return replayed(p, baseline, l).*of; };
     const std::vector<double> line = run(problem), a = run(last), b = run(next), c = run(sooner);
     for (std::size_t k = 0; k < line.size(); ++k) {
       // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
@@ -380,15 +380,15 @@ std::string too_poor(const Problem& problem) {
   return "";
 }
 
-std::string too_short(const Problem& problem, const Search& found) {
-  const Fit& base = found.two_resistors;
+std::string too_short(const Problem& problem, const Found& found) {
+  const Fit& plain = found.plain_baseline;
   // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
   // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
   const auto time_constant_s = [](const Fit& f) {
     const Physical p = physical(f.x);
     return p.R2_K_per_W * p.C2_J_per_K;
   };
-  double housing_s = std::min(time_constant_s(base), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  double housing_s = std::min(time_constant_s(plain), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
   for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
     Problem one = problem;
     one.logs = {problem.logs[l]};
@@ -402,12 +402,12 @@ std::string too_short(const Problem& problem, const Search& found) {
   double lasts_s = 0;
   for (const Bins& log : problem.logs) lasts_s += log.duration_s();
   if (lasts_s < housing_s) {
-    const bool known = problem.belief.known || determines_housing(problem, base);
+    const bool known = problem.belief.known || determines_housing(problem, plain);
     return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
   const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };
-  if ((found.verdict == Verdict::adequate && !settles(base)) || (explains && !settles(found.chosen.fit)))
+  if ((found.verdict == Verdict::adequate && !settles(plain)) || (explains && !settles(found.chosen.fit)))
     return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
   if (never_changes(problem))
     return "The load never changes, so heat and cooling cannot be told apart; record rests between loads of several "
@@ -415,9 +415,9 @@ std::string too_short(const Problem& problem, const Search& found) {
   return "";
 }
 
-std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+std::string suspicion(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
-  for (const Fit* f : {&found.base.fit, &found.chosen.fit}) {
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     if (far_too_slow(problem, *f)) return in_milliseconds;
   }
   if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
@@ -438,7 +438,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
   double winding_of_housing = 0;  // a cause may imitate what the other column was
-  for (const Fit* f : {&found.base.fit, &found.chosen.fit, &best})
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
     winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
   if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
       follows_as_well_swapped(problem, best, logs, motor)) {
@@ -450,7 +450,7 @@ std::string suspicion(const Problem& problem, const Search& found, const std::ve
   return unlike_the_motor(problem, found, logs);
 }
 
-std::string clipped(const Search& found, const std::vector<Log>& logs) {
+std::string clipped(const Found& found, const std::vector<Log>& logs) {
   if (found.verdict == Verdict::adequate) return "";
   constexpr double least_share = 0.005, often = 3;  // of the rows; times as often as any other value is told
   for (const Log& log : logs) {
@@ -479,16 +479,17 @@ std::string clipped(const Search& found, const std::vector<Log>& logs) {
   return "";
 }
 
-std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs) {
+std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   if (found.verdict == Verdict::adequate) return "";
-  const Fit &base = found.base.fit, &chosen = found.chosen.fit;
-  double open_K = left_open_K(problem, base, logs);
+  const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
+  double open_K = left_open_K(problem, baseline, logs);
   if (alternates_between_rows(logs))
-    open_K = std::max(open_K, apart_K(under(problem, logs, told_last), base, under(problem, logs, told_beside), base));
+    open_K = std::max(open_K,
+                      apart_K(under(problem, logs, told_last), baseline, under(problem, logs, told_beside), baseline));
   // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
   const bool unknown = found.verdict == Verdict::unknown_cause;
   const double asked_K = unknown ? disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K
-                                 : apart_K(problem, base, problem, chosen);
+                                 : apart_K(problem, baseline, problem, chosen);
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
   // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
   constexpr double times = 2.5, worth_K = 0.02;

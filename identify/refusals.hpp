@@ -14,18 +14,18 @@ namespace identify {
 std::string too_poor(const Problem& problem);
 
 /// Shorter than the housing's time constant, or too short or of too even a load for what was found? Empty when not.
-std::string too_short(const Problem& problem, const Search& found);
+std::string too_short(const Problem& problem, const Found& found);
 
 /// What is wrong with the recording rather than with the motor, seen only after the search; empty when nothing is.
-std::string suspicion(const Problem& problem, const Search& found, const std::vector<Log>& logs,
+std::string suspicion(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor);
 
 /// Does the sensor of what heats reach no further than what it shows most? Empty when it does, and when two resistors
 /// are adequate all the same.
-std::string clipped(const Search& found, const std::vector<Log>& logs);
+std::string clipped(const Found& found, const std::vector<Log>& logs);
 
 /// May what was found, or what nothing explains, be of rows too far apart, or of a load that cells do not tell? Empty
 /// when not.
-std::string too_sparse(const Problem& problem, const Search& found, const std::vector<Log>& logs);
+std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs);
 
 }  // namespace identify

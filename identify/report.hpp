@@ -18,11 +18,6 @@ struct ParameterLine {
   bool at_bound = false;
 };
 
-struct Rmse {
-  double housing_K = 0, core_K = 0;  // NaN: not measured
-  double housing_worst_K = 0, core_worst_K = 0;
-};
-
 // Evidence is twice a logarithm (search.hpp); the JSON calls it delta_bic, as its contract does.
 struct Rival {
   std::string id;
@@ -88,7 +83,7 @@ struct Gain {
 inline constexpr const char* gauge_words =
     "all temperatures stay the same when heat, 1/R and C are multiplied by one number: a wrong current gain cannot be "
     "seen";
-std::string cause_heading(Verdict verdict);           // "Behaves like"
+std::string cause_heading(Verdict verdict);                // "Behaves like"
 std::string nearest_words(const HeldOutScore& held_out);   // which has a nearest set
 std::string interval_words(const HeldOutScore& held_out);  // which has intervals
 std::string whiteness_words(const Whiteness& of_residual);

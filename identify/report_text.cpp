@@ -36,14 +36,12 @@ std::string two_resistors(const Report& r) {
 }
 
 std::string variants(const Report& r) {
+  constexpr double worse = 1.15;  // clearly, of an rms
   if (r.variants.empty()) return "";
   std::string s = "\nThe same with\n";
   for (const Variant& v : r.variants) s += fmt::format("  {:<55} {}\n", v.what, rmse(v.rmse));
   if (r.variants.size() == 2) {
-    const Rmse &with = r.variants[0].rmse, &without = r.variants[1].rmse;
-    const double a = std::isnan(with.core_K) ? with.housing_K : with.core_K,
-                 b = std::isnan(without.core_K) ? without.housing_K : without.core_K;
-    if (a > 1.15 * b) {
+    if (r.variants[0].rmse.judged_K() > worse * r.variants[1].rmse.judged_K()) {
       s += "  The coefficient of copper, which is certain, makes the fit WORSE: without it two errors cancel.\n"
            "  Some heat does not follow the current, or the cooling is not constant.\n";
     }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
 #include "identify/leeway.hpp"
 #include "identify/parallel.hpp"
@@ -38,8 +37,7 @@ double unseen_error_K(const Problem& problem, const std::vector<Chosen>& chosen,
   const Problem first = first_part(problem, veto_share);
   const Fit f = fit(first, chosen, {&warm});
   if (!f.valid()) return 1e300;
-  const Rmse e = rmse_of(last_part(problem, veto_share), f);
-  return std::isnan(e.core_K) ? e.housing_K : e.core_K;
+  return rmse_of(last_part(problem, veto_share), f).judged_K();
 }
 
 std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}", fmt::join(names_of(chosen), " + ")); }
@@ -50,6 +48,9 @@ std::string listed(const std::vector<Chosen>& chosen) { return fmt::format("{}",
 /// and 880).
 constexpr double doubted = 2;
 
+/// So much farther off on what a veto is tried on, a pair spoils what is to come.
+constexpr double spoilt = 1.1;
+
 /// Why the best pair is not believed; empty when it is. `counted`: a slow disturbance counts as noise already, and is
 /// no rival any more.
 std::string why_no_pair(const Problem& problem, bool counted, const Field& field, const Margins& margins) {
@@ -58,7 +59,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   if (field.pairs.empty()) return fmt::format("No further cause goes with {}.", first);
   const Candidate& pair = field.pairs.front();
   const std::string both = listed(pair.fit.chosen);
-  const double more = pair.gain - single.gain;
+  const double more = pair.evidence - single.evidence;
   if (!(more > margins.second))
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
@@ -67,7 +68,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
     return fmt::format(
         "{} would gain {:.1f} more, but moves no temperature by more than {:.2f} K rms: not worth a name.", both, more,
         moved);
-  const double nameless = counted ? 0 : disturbance_of(problem, single.fit).gain;
+  const double nameless = counted ? 0 : disturbance_of(problem, single.fit).evidence;
   if (!(more > nameless + margins.second))
     return fmt::format("{} would gain {:.1f} more than {}, a slow disturbance without a name {:.1f}: stopped there.",
                        both, more, first, nameless);
@@ -82,7 +83,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   // Veto: where something else is wrong, one more cause can fit the past and spoil the future.
   const double fewer_K = unseen_error_K(problem, single.fit.chosen, single.fit);
   const double more_K = unseen_error_K(problem, pair.fit.chosen, pair.fit);
-  if (!counted && more_K > 1.1 * fewer_K && disturbance_of(problem, pair.fit).gain > margins.remains)
+  if (!counted && more_K > spoilt * fewer_K && disturbance_of(problem, pair.fit).evidence > margins.remains)
     return fmt::format(
         "{} fits better, but misses the last quarter by {:.1f} K where {} misses it by {:.1f} K: refused.", both,
         more_K, first, fewer_K);
@@ -92,13 +93,13 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
 /// Every cause alone, more than once: the best of a round shows what motor it is, which leeway goes by, and how noisy
 /// the readings are, and with that all are fitted again. `ordinary`: by which leeway went before.
 void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vector<Chosen>& all, const Margins& margins,
-                                Field& field, Search& out) {
+                                Field& field, Found& out) {
   fit_alone(problem, all, field);
   if (field.singles.empty()) return;
   const auto best = [&]() -> const Fit& {
-    return field.singles.front().gain > 0 ? field.singles.front().fit : field.base.fit;
+    return field.singles.front().evidence > 0 ? field.singles.front().fit : field.baseline.fit;
   };
-  if (field.singles.front().gain > margins.detect) {
+  if (field.singles.front().evidence > margins.detect) {
     ordinary = field.singles.front().fit;
     problem.leeway = ordinary_leeway(problem, ordinary);
   }
@@ -119,46 +120,47 @@ void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vecto
 
 /// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
 bool noticeable(const Problem& problem, const Disturbance& d, const Margins& margins) {
-  return d.gain > margins.remains &&
+  return d.evidence > margins.remains &&
          d.noise.disturbance_K > std::max({margins.disturbed_K, step_noise_share * coarsest_step_K(problem),
                                            of_current_K(problem, margins)});
 }
 
 /// Is nothing missing, or nothing that has a name? Then the verdict and the reasons are written.
 bool ends_without_a_name(const Problem& problem, const Field& field, const Disturbance& without_causes,
-                         const Margins& margins, Search& out) {
-  const double gain = field.singles.empty() ? 0 : field.singles.front().gain;
+                         const Margins& margins, Found& out) {
+  const double evidence = field.singles.empty() ? 0 : field.singles.front().evidence;
   const std::string first = field.singles.empty() ? "none" : listed(field.singles.front().fit.chosen);
-  const double moves = gain > margins.detect ? moved_K(problem, field.singles.front().fit, out.base.fit) : 0;
+  const double moves = evidence > margins.detect ? moved_K(problem, field.singles.front().fit, out.baseline.fit) : 0;
   const bool disturbed = noticeable(problem, without_causes, margins);
-  if (gain > margins.detect && (moves >= std::max(margins.worth_K, of_current_K(problem, margins)) || disturbed))
+  if (evidence > margins.detect && (moves >= std::max(margins.worth_K, of_current_K(problem, margins)) || disturbed))
     return false;
   out.verdict = disturbed ? Verdict::unknown_cause : Verdict::adequate;
   out.steps.push_back(
-      gain > margins.detect
+      evidence > margins.detect
           ? fmt::format(
                 "{} gains {:.1f} in evidence, but moves no temperature by more than {:.2f} K rms: not worth a name.",
-                first, gain, moves)
+                first, evidence, moves)
           : fmt::format("No single cause gains more than {:.0f} in evidence (the best, {}, gains {:.1f}).",
-                        margins.detect, first, gain));
+                        margins.detect, first, evidence));
   if (disturbed)
     out.steps.push_back(
         fmt::format("Yet a slow disturbance of {:.2f} K without a name gains {:.0f}: something is missing.",
-                    without_causes.noise.disturbance_K, without_causes.gain));
+                    without_causes.noise.disturbance_K, without_causes.evidence));
   return true;
 }
 
 /// Where even the best leaves a disturbance, all are judged again with that counted as noise: a model that is known to
 /// be off cannot rank causes by what is smaller than its error.
 Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>& all, const Margins& margins,
-                               Field& field, Search& out) {
+                               Field& field, Found& out) {
   fit_pairs(problem, field);
-  const auto& leader = field.pairs.empty() || field.pairs.front().gain < field.singles.front().gain + margins.second
-                           ? field.singles.front()
-                           : field.pairs.front();
+  const auto& leader =
+      field.pairs.empty() || field.pairs.front().evidence < field.singles.front().evidence + margins.second
+          ? field.singles.front()
+          : field.pairs.front();
   const Disturbance left = disturbance_of(problem, leader.fit);
   Problem judged = problem;
-  if (left.gain > margins.remains) {
+  if (left.evidence > margins.remains) {
     judged.noise = left.noise;
     out.steps.push_back(
         fmt::format("Even the best set, {}, leaves a slow disturbance of {:.2f} K, which from here on counts as noise.",
@@ -170,14 +172,14 @@ Problem judged_by_what_remains(const Problem& problem, const std::vector<Chosen>
 }
 
 /// One cause or two?
-void choose(const Problem& judged, bool counted, const Margins& margins, Field field, Search& out) {
+void choose(const Problem& judged, bool counted, const Margins& margins, Field field, Found& out) {
   if (counted && !field.pairs.empty()) add_neighbours(judged, field, field.pairs);
   const std::string refusal = why_no_pair(judged, counted, field, margins);
   const std::vector<Candidate> singles = field.singles;
   if (refusal.empty()) {
     const Candidate &pair = field.pairs.front(), &single = field.singles.front();
-    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.gain,
-                                    pair.gain - single.gain, listed(single.fit.chosen)));
+    out.steps.push_back(fmt::format("{} gains {:.1f}, {:.1f} more than {}.", listed(pair.fit.chosen), pair.evidence,
+                                    pair.evidence - single.evidence, listed(single.fit.chosen)));
     out.sets = std::move(field.pairs);
   } else {
     out.steps.push_back(refusal);
@@ -190,18 +192,18 @@ void choose(const Problem& judged, bool counted, const Margins& margins, Field f
     for (const Candidate& single : singles) {
       const Chosen& other = single.fit.chosen.front();
       const auto& set = out.chosen.fit.chosen;
-      if (!(other == cause) && std::find(set.begin(), set.end(), other) != set.end()) without = single.gain;
+      if (!(other == cause) && std::find(set.begin(), set.end(), other) != set.end()) without = single.evidence;
     }
-    out.own_gain.push_back(out.chosen.gain - without);
+    out.own_evidence.push_back(out.chosen.evidence - without);
   }
 }
 
 /// What the set that was chosen leaves.
 struct Left {
   double before_K, after_K;  // missed by the baseline; of a disturbance beside the set
-  double gain;               // of that disturbance
-  double explains;           // gain of the set with it over a disturbance alone
-  double still;              // gain of the set where readings are believed no closer than a model can be right
+  double evidence;           // of that disturbance
+  double explains;           // evidence of the set with it over a disturbance alone
+  double still;              // evidence of the set where readings are believed no closer than a model can be right
   double by_parts;           // what parts of the logs, each fitted for itself, gain over one fit
   bool believed;             // the set gains by both
   bool steady;               // which is chance: one set of parameters serves all parts
@@ -214,7 +216,7 @@ struct Left {
         "two resistors missed {:.2f} K; beside the best set a slow disturbance of {:.2f} K would gain another {:.1f}; "
         "over a disturbance alone the two gain {:.1f}, and the set {:.1f} where readings are believed no closer than "
         "a model can be right{}",
-        before_K, after_K, gain, explains, still,
+        before_K, after_K, evidence, explains, still,
         steady ? "" : fmt::format("; parts of the log, each fitted for itself, gain {:.1f} more", by_parts));
   }
 };
@@ -234,27 +236,27 @@ double gained_by_parts(const Problem& problem, const Fit& all) {
   return most;
 }
 
-Left left_by_chosen(const Problem& problem, const Problem& judged, const Search& found,
+Left left_by_chosen(const Problem& problem, const Problem& judged, const Found& found,
                     const Disturbance& without_causes, const Margins& margins) {
   const std::vector<Chosen>& chosen = found.chosen.fit.chosen;
   const Disturbance left = disturbance_of(problem, fit(problem, chosen, {&found.chosen.fit}));
-  const Rmse missed = rmse_of(problem, found.base.fit);
+  const Rmse missed = rmse_of(problem, found.baseline.fit);
   Left out{};
   out.before_K = std::isnan(missed.housing_K) ? missed.core_K : missed.housing_K;
   out.after_K = left.noise.disturbance_K;
-  out.gain = left.gain;
-  out.explains = left.evidence - without_causes.evidence;
+  out.evidence = left.evidence;
+  out.explains = left.joint_evidence - without_causes.joint_evidence;
   // Believed closer, what a motor has and no cause in the table is would count: a frame, teeth, a sensor's own offset.
   const Problem less = believed_less(judged, found.chosen.fit, 1);
-  out.still = fit(less, {}, {&found.base.fit}).surprise() - fit(less, chosen, {&found.chosen.fit}).surprise();
+  out.still = fit(less, {}, {&found.baseline.fit}).surprise() - fit(less, chosen, {&found.chosen.fit}).surprise();
   out.believed = out.explains > margins.tie && out.still > margins.still;
   out.by_parts = gained_by_parts(less, found.chosen.fit);
   out.steady = out.by_parts < margins.parts;
-  out.complete = left.gain < margins.remains && out.steady;
+  out.complete = left.evidence < margins.remains && out.steady;
   const bool rules_parts = out.steady || out.explains > margins.dominance * out.by_parts;
   const bool unrested = problem.noise.idle_s == 0;
   const double small_part = unrested ? margins.small_part_unrested : margins.small_part;
-  out.mostly = rules_parts && (left.gain < margins.remains || out.explains > margins.dominance * left.gain ||
+  out.mostly = rules_parts && (left.evidence < margins.remains || out.explains > margins.dominance * left.evidence ||
                                out.after_K < small_part * out.before_K);
   out.nearly = rules_parts && unrested && out.after_K < margins.small_part_unseen * out.before_K;
   return out;
@@ -263,11 +265,11 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Search&
 /// Which sets are as good, and which nearly, so that a board must not take them for excluded? What is left over may
 /// belong to any of them. Told are the next best and those that differ from the best by no more than twice what is left
 /// (Margins::left_apart).
-void mark_ties(const Problem& problem, const Left& left, double lead, const Margins& margins, Search& out) {
-  const double by_noise_K = of_current_K(problem, margins), slack = left.complete ? 0 : left.gain;
+void mark_ties(const Problem& problem, const Left& left, double lead, const Margins& margins, Found& out) {
+  const double by_noise_K = of_current_K(problem, margins), slack = left.complete ? 0 : left.evidence;
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (Candidate& c : out.sets) {
-    const double behind = out.chosen.gain - c.gain;
+    const double behind = out.chosen.evidence - c.evidence;
     if (c.chosen || (behind >= margins.tie + slack && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
@@ -284,10 +286,10 @@ void mark_ties(const Problem& problem, const Left& left, double lead, const Marg
 
 /// The verdict on the set that was chosen, and why.
 void decide(const Problem& problem, const Left& left, const Disturbance& without_causes, double reach,
-            const Margins& margins, Search& out) {
+            const Margins& margins, Found& out) {
   std::string sets;
   for (std::size_t i = 0; i < std::min<std::size_t>(6, out.sets.size()); ++i)
-    sets += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].gain);
+    sets += fmt::format("{}{} {:.1f}", i > 0 ? ", " : "", listed(out.sets[i].fit.chosen), out.sets[i].evidence);
   out.steps.push_back("The best sets and their evidence: " + sets + ".");
 
   const bool tie = out.tied.size() > 1;
@@ -300,7 +302,7 @@ void decide(const Problem& problem, const Left& left, const Disturbance& without
         "are believed no closer than a model can be right: no more than sensors wander and a model of a few nodes is "
         "off.",
         listed(out.chosen.fit.chosen), without_causes.noise.disturbance_K, left.explains, left.still));
-    out.chosen = out.base;
+    out.chosen = out.baseline;
   } else if (!left.believed || (!left.complete && !left.mostly && !(left.nearly && tie))) {
     out.verdict = Verdict::unknown_cause;
     out.doubted = left.complete;
@@ -323,13 +325,13 @@ void decide(const Problem& problem, const Left& left, const Disturbance& without
 }
 
 /// Too little for a name, and yet likelier than two resistors: a board must not take it for excluded.
-void mark_likelier(const Problem& judged, const Margins& margins, Search& out) {
+void mark_likelier(const Problem& judged, const Margins& margins, Found& out) {
   std::vector<double> likelier(out.singles.size(), 0.0);
   in_parallel(likelier.size(), [&](std::size_t i) {
     const Fit& f = out.singles[i].fit;
-    if (!(out.singles[i].gain > 0)) return;
+    if (!(out.singles[i].evidence > 0)) return;
     const Problem less = believed_less(judged, f, 1);
-    likelier[i] = fit(less, {}, {&out.base.fit}).surprise() - fit(less, f.chosen, {&f}).surprise();
+    likelier[i] = fit(less, {}, {&out.baseline.fit}).surprise() - fit(less, f.chosen, {&f}).surprise();
   });
   const double most = likelier.empty() ? 0 : *std::max_element(likelier.begin(), likelier.end());
   for (std::size_t i = 0; i < likelier.size(); ++i)
@@ -358,11 +360,11 @@ std::string held_by_a_bound(const Fit& f, double tie) {
 /// plain as well, to the noise that was judged by and no closer than such a model can be right. The leeway for lateness
 /// and frame stays: without it C1 of whole boards came out 7 percent too small in the median with standard errors of 3
 /// (gain, designed), and once a third too large (603: 11 K over the limit).
-void refit_for_the_board(Problem judged, const Margins& margins, Search& out) {
+void refit_for_the_board(Problem judged, const Margins& margins, Found& out) {
   if (out.verdict == Verdict::adequate) mark_likelier(judged, margins, out);
   // A winding read all the time shows R1 itself; one read now and then is outvoted by the housing.
-  if (judged.noise.core_slow_K == 0) judged.leeway.push_back(leeway_of_load(judged, out.base.fit));
-  std::vector<Fit*> handed_on = {&out.base.fit, &out.chosen.fit};
+  if (judged.noise.core_slow_K == 0) judged.leeway.push_back(leeway_of_load(judged, out.baseline.fit));
+  std::vector<Fit*> handed_on = {&out.baseline.fit, &out.chosen.fit};
   for (std::vector<Candidate>* candidates : {&out.sets, &out.singles}) {
     for (Candidate& c : *candidates) {
       if (c.likely) handed_on.push_back(&c.fit);
@@ -398,23 +400,22 @@ const char* word(Verdict v) {
   return "insufficient";
 }
 
-Search search(const Problem& given, const Margins& margins, const std::vector<std::string>& without,
-              const Tell& doing) {
+Found search(const Problem& given, const Margins& margins, const std::vector<std::string>& without, const Tell& doing) {
   Problem problem = given;
-  Search out;
+  Found out;
   Field field;
   const auto all = available(problem, without);
   doing("fitting each cause alone");
-  out.two_resistors = fit(problem, {});
-  if (!out.two_resistors.valid()) return out;
-  problem.leeway = ordinary_leeway(problem, out.two_resistors);
-  fit_alone_and_settle_noise(problem, out.two_resistors, all, margins, field, out);
-  out.base = out.chosen = field.base;
+  out.plain_baseline = fit(problem, {});
+  if (!out.plain_baseline.valid()) return out;
+  problem.leeway = ordinary_leeway(problem, out.plain_baseline);
+  fit_alone_and_settle_noise(problem, out.plain_baseline, all, margins, field, out);
+  out.baseline = out.chosen = field.baseline;
   out.noise = problem.noise;
   out.singles = field.singles;
   out.steps.push_back(
-      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.base.ratio));
-  const Disturbance without_causes = disturbance_of(problem, out.base.fit);
+      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.baseline.ratio));
+  const Disturbance without_causes = disturbance_of(problem, out.baseline.fit);
   if (ends_without_a_name(problem, field, without_causes, margins, out)) {
     doing("fitting what a board gets");
     refit_for_the_board(problem, margins, out);
@@ -428,7 +429,7 @@ Search search(const Problem& given, const Margins& margins, const std::vector<st
   const Left left = left_by_chosen(problem, judged, out, without_causes, margins);
   const bool alone = out.chosen.fit.chosen.size() == 1;
   const double lead = alone && problem.belief.known ? margins.tie_alone : margins.tie;
-  const double reach = left.complete ? lead : lead + left.gain;
+  const double reach = left.complete ? lead : lead + left.evidence;
   mark_ties(problem, left, lead, margins, out);
   decide(problem, left, without_causes, reach, margins, out);
   doing("fitting what a board gets");

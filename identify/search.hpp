@@ -75,14 +75,14 @@ const char* word(Verdict verdict);
 /// Of the whole or of most of it.
 inline bool names_causes(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
 
-struct Search {
-  Fit two_resistors;  // to the noise of the recording
-  Candidate base;
+struct Found {
+  Fit plain_baseline;  // without leeway, to the noise of the recording
+  Candidate baseline;
   std::vector<Candidate> singles;              // best first, one per cause (per log for causes that pick one)
   std::vector<Candidate> sets;                 // sets of the size that was chosen, best first
   Candidate chosen;                            // what is believed best, whatever the verdict
   std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good as the best, itself first
-  std::vector<double> own_gain;                // of each cause chosen: over the set without it
+  std::vector<double> own_evidence;            // of each cause chosen: over the set without it
   double remains_K = 0;                        // of a slow disturbance that the sets named or tied leave
   bool doubted = false;  // no cause is known, for a slow disturbance explains as much as the first set
   Noise noise;           // of the readings, as the best model's residuals show it
@@ -92,7 +92,7 @@ struct Search {
 
 /// `without`: ids left out of the table (tests take the truth away and expect "unknown"). Insufficient where no motor
 /// near what is believed can be simulated.
-Search search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {},
-              const Tell& doing = tell_nobody);
+Found search(const Problem& problem, const Margins& margins = {}, const std::vector<std::string>& without = {},
+             const Tell& doing = tell_nobody);
 
 }  // namespace identify

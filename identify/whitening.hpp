@@ -16,6 +16,7 @@ namespace identify {
 struct Whitener {
   double keep, keep_disturbed, wander2, disturbance2, white2;
   double P, P_both, P_disturbed;
+  static constexpr double least_K2 = 1e-8;  // no reading is better than 0.1 mK: what divides stays above nothing
   double gain = 0, gain_disturbed = 0, weight = 0;  // of the present reading; weight = 1 / standard deviation
 
   static Whitener housing(const Noise& n, double step_s) {
@@ -27,7 +28,7 @@ struct Whitener {
 
   bool disturbed() const { return disturbance2 > 0; }
   void reading(double n) {
-    const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + 1e-8;
+    const double a = P + P_both, b = P_both + P_disturbed, S = a + b + white2 / n + least_K2;
     gain = a / S;
     gain_disturbed = b / S;
     weight = 1 / std::sqrt(S);

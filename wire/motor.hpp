@@ -3,6 +3,8 @@
 // simulation its plant and the workshop its starting point. Plain data; files are read by wire/pc/motor_file.hpp.
 #pragma once
 
+#include <numbers>
+
 namespace wire {
 
 /// Sheet values of one motor. Thermal values of sheets are good to 10..30 %: they are where identification starts.
@@ -31,5 +33,8 @@ struct Motor {
   double phase_coupling_W_per_K;  // between each pair of phase windings; 0 is the safe side
   double rated_current_A;         // catalogue, direct current through two terminals
 };
+
+/// What heats and pushes like an amplitude of 1 A.
+inline constexpr double direct_per_amplitude = std::numbers::sqrt3 / 2;
 
 }  // namespace wire

@@ -21,7 +21,7 @@
 #include "wire/pc/files.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/motor_file.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -92,11 +92,7 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
     result = run_scene(scene, options);
   }
   const std::string folder = out + "/" + scene.id;
-  for (const Trace& trace : result.traces) {
-    const std::string axis = trace.axis == 0 ? "" : "-axis1";
-    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), axis), csv(result, trace));
-  }
-  draw(result, fmt::format("{}/{}.svg", folder, scene.id));
+  write_files(result, folder);
   if (json)
     fmt::print("{}", summary_json(result));
   else
@@ -154,11 +150,7 @@ int main(int argc, char** argv) {
   feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
 #endif
   CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples), "host-sim"};
-  app.formatter(std::make_shared<wire::pc::Help>());
-  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
-    const std::string hint = wire::pc::nearest_option(*of);
-    return fmt::format("{}{} --help lists what there is.\n", error.what(), hint.empty() ? ";" : hint);
-  });
+  wire::pc::use_help(app, "--help");
   app.require_subcommand(1);
   std::string scene, hide, out = "out";
   std::vector<std::string> overrides;
@@ -217,8 +209,7 @@ int main(int argc, char** argv) {
       "  host-sim record designed --hide seed=7 --thermocouple   a course that tells more, winding read always\n"
       "  host-sim record profile --profile answer.json --hide seed=7   what identify advised");
 
-  try {
-    app.parse(argc, argv);
+  return wire::pc::run_program(app, argc, argv, [&] {
     if (*run_command) run(scene, overrides, seed_of(hide), out, json);
     if (*list_command) list(json);
     if (*record_command) {
@@ -226,11 +217,6 @@ int main(int argc, char** argv) {
       record_log(recording, out, json);
     }
     if (*figures_command) figures(out, json);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const wire::pc::UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
-  }
-  return 0;
+    return 0;
+  });
 }

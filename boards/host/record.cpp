@@ -83,7 +83,7 @@ std::vector<host_sim::Demand> advised(const std::string& path) {
       return step[key].get<double>();
     };
     host_sim::Demand demand;
-    demand.current_A = number("current_A") * 2 / std::sqrt(3.0);
+    demand.current_A = number("current_A") / wire::direct_per_amplitude;
     demand.speed_rad_per_s = number("speed_rad_per_s");
     const double seconds = number("seconds");
     if (!(seconds >= 0 && seconds <= 86400))

@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <numbers>
 
 #include "boards/dual_48v_80a.hpp"
 #include "boards/host/board.hpp"
 #include "boards/host/heat_file.hpp"
 #include "boards/host/optimum.hpp"
+#include "boards/host/stage.hpp"
 #include "firmware/driver.hpp"
 #include "host-sim/plant/bench.hpp"
 #include "thermal/motor_set.hpp"
@@ -21,13 +21,11 @@
 namespace boards::host {
 namespace {
 
-constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;  // direct current that heats like a phase amplitude of 1 A
-constexpr double no_limit_degC = 1000;                     // for limiters that must do without the governor
-constexpr double oracle_band_K = 1;                        // within which the oracle's current falls from all to none
-constexpr double restart_K = 10;                           // a cut limiter comes back this far below its limit
-constexpr int setpoint_periods = 20;                       // the robot's computer speaks every millisecond
-constexpr long progress_periods = 20000;                   // a simulated second
-constexpr double warm_up_s = 1;  // the board has been on for a second: offsets learnt, housing heard
+constexpr double no_limit_degC = 1000;    // for limiters that must do without the governor
+constexpr double oracle_band_K = 1;       // within which the oracle's current falls from all to none
+constexpr double restart_K = 10;          // a cut limiter comes back this far below its limit
+constexpr int setpoint_periods = 20;      // the robot's computer speaks every millisecond
+constexpr long progress_periods = 20000;  // a simulated second
 
 /// What stands between the demand and the firmware.
 class Wish {
@@ -36,11 +34,12 @@ class Wish {
       : scene_(scene), limiter_(limiter), motor_(file.motor) {}
 
   double amperes(double demand_A, double estimated_core_degC, double true_core_degC, const hal::Temperature& housing) {
+    const double rated_A = motor_.rated_current_A / wire::direct_per_amplitude;
     switch (limiter_) {
       case Limiter::governor:
         return demand_A;
       case Limiter::rated:
-        return std::clamp(demand_A, -motor_.rated_current_A / root_3_over_2, motor_.rated_current_A / root_3_over_2);
+        return std::clamp(demand_A, -rated_A, rated_A);
       case Limiter::housing:
         return cut(housing.value_degC, scene_.housing_limit_degC) ? 0 : demand_A;
       case Limiter::hard_cut:
@@ -87,7 +86,7 @@ class Sums {
       return std::copysign(std::sqrt(std::max(0.0, sampled_A2 + unseen_A2 / n)), q_A_);
     };
     row.iq_A = amplitude_A(unseen_of_mean_A2_);
-    row.current_A = root_3_over_2 * amplitude_A(unseen_of_heat_A2_);
+    row.current_A = wire::direct_per_amplitude * amplitude_A(unseen_of_heat_A2_);
     row.speed_rad_per_s = speed_ / n;
     row.bus_V = bus_V_ / n;
     row.torque_Nm = torque_Nm_ / n;
@@ -101,26 +100,8 @@ class Sums {
   int count_ = 0;
 };
 
-host_sim::Load load_of(const Shaft& shaft) {
-  host_sim::Load load;
-  if (shaft.kind == Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
-  if (shaft.kind == Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
-  load.inertia_kg_m2 = shaft.load_inertia_kg_m2;
-  return load;
-}
-
-double hottest_degC(const firmware::AxisState& state) {
-  return static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
-}
-
 firmware::BoardRating rating_of(const std::string& board) {
   return board == "h8-17.5d" ? dual_48V_80A : dual_48V_20A;  // scene.cpp lets no other name through
-}
-
-host_sim::HeatOptions heat_options(const Scene& scene) {
-  host_sim::HeatOptions options;
-  options.coolant_R2_K_per_W = scene.coolant_K_per_W;
-  return options;
 }
 
 /// One board with its motors, and the firmware on it.
@@ -163,21 +144,14 @@ class Board {
 };
 
 host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile& file, const RunOptions& options) {
-  host_sim::BenchDesign design;
-  for (host_sim::AxisDesign& axis : design.axes) {
-    axis = host_sim::axis_from_sheet(options.plant_motor.value_or(file.motor), heat_options(scene));
-    axis.hidden = options.hidden;
-  }
+  host_sim::BenchDesign design = bench_of(scene, options.plant_motor.value_or(file.motor));
+  for (host_sim::AxisDesign& axis : design.axes) axis.hidden = options.hidden;
   const firmware::BoardRating rating = rating_of(scene.board);
   design.bridge.pwm_Hz = static_cast<double>(rating.pwm_Hz);
   design.bridge.dead_time_s = static_cast<double>(rating.dead_time_s);
   const double larger = static_cast<double>(rating.peak_A / dual_48V_20A.peak_A);
   design.sensors.current_A_per_count *= larger;
   design.sensors.bus_A_per_count *= larger;
-  design.supply.open_V = scene.supply_V;
-  design.supply.can_sink = scene.supply_sinks;
-  design.start_degC = scene.start_degC;
-  design.ambient_degC = scene.ambient_degC;
   return design;
 }
 
@@ -188,22 +162,20 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
   const firmware::BoardRating rating = rating_of(scene.board);
   firmware::AxisSetup axis;
   axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
-  std::optional<thermal::Trust> of_the_fit;
+  thermal::Trust of_the_model = thermal::identified_trust;
   if (scene.model.empty()) {
     axis.heat = thermal::three_phase_set(known);
   } else {
     const HeatModel model = read_heat_model(scene.model);
     axis.heat = thermal::split_phases(model.set, known.phase_coupling_W_per_K);
-    of_the_fit = model.trust;
+    of_the_model = model.trust.value_or(of_the_model);
   }
   if (limiter != Limiter::governor) {
     for (thermal::Node<double>& node : axis.heat.nodes) {
       if (std::isfinite(node.max_degC)) node.max_degC = static_cast<float>(no_limit_degC);
     }
   }
-  axis.estimator.trust = scene.trust == "sheet"        ? thermal::sheet_trust
-                         : scene.trust == "identified" ? of_the_fit.value_or(thermal::identified_trust)
-                                                       : thermal::exact_trust;
+  axis.estimator.trust = trust_of(scene, of_the_model);
   return {rating, {axis, axis}};
 }
 
@@ -276,13 +248,11 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
   const auto periods_in = [&](double seconds) { return std::lround(seconds / period_s); };
   const long slow_periods = periods_in(thermal::estimator_dt_s), warm_up = periods_in(warm_up_s);
   const long total = warm_up + periods_in(scene_.seconds), log_periods = std::max(1L, periods_in(1 / scene_.log_Hz));
-  const bool two_axes =
-      std::any_of(scene_.demands.begin(), scene_.demands.end(), [](const Demand& d) { return d.axis == 1; });
 
   std::vector<Trace> traces;
   std::vector<Wish> wishes;
   std::vector<Sums> sums(2);
-  for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis) {
+  for (int axis = 0; axis < axes_of(scene_); ++axis) {
     traces.push_back({limiter_, axis, {}});
     wishes.emplace_back(scene_, limiter_, file_);
   }
@@ -321,13 +291,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
 
 Result run_scene(const Scene& scene, const RunOptions& options) {
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, options.motor_folder);
-  Result result{.scene = scene,
-                .motor_name = file.name,
-                .surrogate = file.surrogate,
-                .winding_max_degC = file.motor.winding_max_degC,
-                .optimal_impulse_As = 0,
-                .traces = {}};
-
+  Result result = result_of(scene, file);
   if (scene.shaft.kind != Shaft::Kind::locked && scene.program.empty()) {
     const wire::Motor known =
         host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "wire/pc/files.hpp"
 #include "wire/pc/plot.hpp"
 
 namespace boards::host {
@@ -69,6 +70,54 @@ double smallest_allowance_A(const Trace& trace) {
     if (row.demand_A != 0) smallest = std::min(smallest, row.allowance_A);
   }
   return smallest;
+}
+
+/// The picture of the scene.
+void draw(const Result& result, const std::string& path) {
+  using wire::pc::Curve;
+  using wire::pc::Panel;
+  constexpr const char* colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
+
+  const auto curve = [&](std::size_t i, double Row::*value, const std::string& text) {
+    const Trace& trace = result.traces[i];
+    Curve c{text, {}, {}, colours[i % std::size(colours)]};
+    for (const Row& row : trace.rows) {
+      c.x.push_back(row.time_s);
+      c.y.push_back(row.*value);
+    }
+    return c;
+  };
+  const auto all = [&](double Row::*value, bool labelled) {
+    std::vector<Curve> curves;
+    for (std::size_t i = result.traces.size(); i-- > 0;) {  // the first limiter, hotcore, is drawn on top
+      curves.push_back(curve(i, value, labelled ? label(result, result.traces[i]) : ""));
+    }
+    return curves;
+  };
+
+  Panel current{"current, A", all(&Row::iq_now_A, true)};
+  Curve asked = curve(0, &Row::demand_A, "asked for");
+  asked.colour = "#909090";
+  asked.dashed = true;
+  current.curves.push_back(asked);
+
+  Panel core{
+      "hottest winding, °C", all(&Row::true_core_degC, false), {{result.winding_max_degC, "limit of the winding"}}};
+  Curve believed = curve(0, &Row::estimated_core_degC, "hotcore's estimate");
+  believed.dashed = true;
+  believed.colour = "#000000";
+  core.curves.push_back(believed);
+
+  Panel housing{"housing sensor, °C", all(&Row::housing_degC, false)};
+  std::vector<Panel> panels = {current, core, housing};
+  if (std::any_of(result.traces.begin(), result.traces.end(), [](const Trace& t) { return t.peak_shaft_W > 20; })) {
+    panels.push_back({"shaft power, W", all(&Row::shaft_W, false)});
+  }
+  wire::pc::write_svg(path, {.title = result.scene.title,
+                             .x_label = "time, s",
+                             .panels = panels,
+                             .note = result.scene.note + (result.surrogate ? " Motor data: surrogate." : ""),
+                             .x_range = {0, result.scene.seconds}});
 }
 
 }  // namespace
@@ -135,51 +184,12 @@ std::string summary_json(const Result& result) {
   return out.dump(2) + "\n";
 }
 
-void draw(const Result& result, const std::string& path) {
-  using wire::pc::Curve;
-  using wire::pc::Panel;
-  constexpr const char* colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
-
-  const auto curve = [&](std::size_t i, double Row::*value, const std::string& text) {
-    const Trace& trace = result.traces[i];
-    Curve c{text, {}, {}, colours[i % std::size(colours)]};
-    for (const Row& row : trace.rows) {
-      c.x.push_back(row.time_s);
-      c.y.push_back(row.*value);
-    }
-    return c;
-  };
-  const auto all = [&](double Row::*value, bool labelled) {
-    std::vector<Curve> curves;
-    for (std::size_t i = result.traces.size(); i-- > 0;) {  // the first limiter, hotcore, is drawn on top
-      curves.push_back(curve(i, value, labelled ? label(result, result.traces[i]) : ""));
-    }
-    return curves;
-  };
-
-  Panel current{"current, A", all(&Row::iq_now_A, true)};
-  Curve asked = curve(0, &Row::demand_A, "asked for");
-  asked.colour = "#909090";
-  asked.dashed = true;
-  current.curves.push_back(asked);
-
-  Panel core{
-      "hottest winding, °C", all(&Row::true_core_degC, false), {{result.winding_max_degC, "limit of the winding"}}};
-  Curve believed = curve(0, &Row::estimated_core_degC, "hotcore's estimate");
-  believed.dashed = true;
-  believed.colour = "#000000";
-  core.curves.push_back(believed);
-
-  Panel housing{"housing sensor, °C", all(&Row::housing_degC, false)};
-  std::vector<Panel> panels = {current, core, housing};
-  if (std::any_of(result.traces.begin(), result.traces.end(), [](const Trace& t) { return t.peak_shaft_W > 20; })) {
-    panels.push_back({"shaft power, W", all(&Row::shaft_W, false)});
+void write_files(const Result& result, const std::string& folder) {
+  for (const Trace& trace : result.traces) {
+    const std::string axis = trace.axis == 0 ? "" : "-axis1";
+    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), axis), csv(result, trace));
   }
-  wire::pc::write_svg(path, {.title = result.scene.title,
-                             .x_label = "time, s",
-                             .panels = panels,
-                             .note = result.scene.note + (result.surrogate ? " Motor data: surrogate." : ""),
-                             .x_range = {0, result.scene.seconds}});
+  draw(result, fmt::format("{}/{}.svg", folder, result.scene.id));
 }
 
 }  // namespace boards::host

@@ -67,7 +67,7 @@ std::string csv(const Result& result, const Trace& trace);
 std::string summary_text(const Result& result);
 std::string summary_json(const Result& result);
 
-/// The picture of the scene as SVG, written to `path`.
-void draw(const Result& result, const std::string& path);
+/// A log a trace and the picture of the scene as SVG, into `folder`.
+void write_files(const Result& result, const std::string& folder);
 
 }  // namespace boards::host

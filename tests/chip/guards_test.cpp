@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "tests/chip/image.hpp"
-#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -48,8 +47,7 @@ TEST(Guards, GateDriversStayOffUntilTheImageIsReady) {
 }
 
 // Hang of a lane, or of any handler: whatever is more urgent still runs, and a watchdog that it does not feed bites.
-TEST(Guards, AHangAnywhereEndsInAResetWithOpenGates) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowGuards, AHangAnywhereEndsInAResetWithOpenGates) {
   NEEDS_IMAGE(image);
   struct Hang {
     const char* where;

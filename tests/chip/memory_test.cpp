@@ -7,7 +7,6 @@
 
 #include "boards/h8-15d/heat_keeper.hpp"
 #include "tests/chip/image.hpp"
-#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -69,8 +68,7 @@ void spoil_backup(Pcb& pcb) {
   for (std::size_t i = 0; i < 4096; ++i) pcb.chip.backup_ram()[i] = static_cast<std::uint8_t>(37 * i + 1);
 }
 
-TEST(Memory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMemory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
   NEEDS_IMAGE(image);
   for (const int hang : {0, 16 + 18}) {  // main loop: IWDG; fast lane: WWDG
     auto pcb = small_motors(heard_s);
@@ -91,8 +89,7 @@ TEST(Memory, AResetInAnyPlaceOfABurstForgetsNoHeat) {
   }
 }
 
-TEST(Memory, APowerCutOf2sInABurstForgetsNoHeatWithOrWithoutABattery) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMemory, APowerCutOf2sInABurstForgetsNoHeatWithOrWithoutABattery) {
   NEEDS_IMAGE(image);
   for (const bool battery : {true, false}) {
     auto pcb = small_motors(heard_s);
@@ -109,8 +106,7 @@ TEST(Memory, APowerCutOf2sInABurstForgetsNoHeatWithOrWithoutABattery) {
   }
 }
 
-TEST(Memory, TwentyQuickPowerCyclesDoNotAddUpToABurntWinding) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMemory, TwentyQuickPowerCyclesDoNotAddUpToABurntWinding) {
   NEEDS_IMAGE(image);
   auto pcb = small_motors(heard_s);
   ASSERT_TRUE(pcb->arm());
@@ -151,8 +147,7 @@ TEST(Memory, ASpoiltBackupMemoryFallsBackOnTheJournalWhichCountsForOneStartOnly)
   EXPECT_NEAR(estimated_degC(*pcb), limit_degC - 10, 3.0);
 }
 
-TEST(Memory, WithNothingRememberedTheStartIsHotAndAHotMotorStaysWhole) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMemory, WithNothingRememberedTheStartIsHotAndAHotMotorStaysWhole) {
   NEEDS_IMAGE(image);
   auto pcb = small_motors(heard_s);
   ASSERT_TRUE(pcb->arm());
@@ -221,8 +216,7 @@ TEST(Memory, ParametersAreSavedOnlyDisarmedAndAreInForceAfterARestart) {
   EXPECT_EQ(pcb->chip.troubles().count(), 0u) << pcb->chip.report_text();
 }
 
-TEST(Memory, APowerCutInEachWordOfAParameterSaveLeavesTheLastSetOrTheOneBefore) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMemory, APowerCutInEachWordOfAParameterSaveLeavesTheLastSetOrTheOneBefore) {
   NEEDS_IMAGE(image);
   int kept_old = 0, kept_new = 0;
   for (int cut = 1; cut <= 92; ++cut) {

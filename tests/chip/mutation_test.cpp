@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "tests/chip/image.hpp"
-#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -251,8 +250,7 @@ TEST(Mutation, TheHealthyImagePassesTheExamination) {
   EXPECT_EQ(examine({}), "");
 }
 
-TEST(Mutation, TheExaminationCatches95PercentOfTheMistakes) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMutation, TheExaminationCatches95PercentOfTheMistakes) {
   NEEDS_IMAGE(image);
   const std::vector<Mutation> all = mutations();
   ASSERT_GE(all.size(), 40u);

@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "tests/chip/plugged.hpp"
-#include "tests/slow_build.hpp"
 
 namespace image_tests {
 namespace {
@@ -152,8 +151,7 @@ TEST(UsbMutation, TheHealthyImagePassesTheExamination) {
   EXPECT_EQ(examine(nullptr), "");
 }
 
-TEST(UsbMutation, AlmostEveryMistakeInTheUsbDriverIsCaught) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowUsbMutation, AlmostEveryMistakeInTheUsbDriverIsCaught) {
   NEEDS_IMAGE(image);
   int caught = 0, all = 0;
   for (const Mutation& m : mutations()) {

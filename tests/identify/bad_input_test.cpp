@@ -18,7 +18,6 @@
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/program.hpp"
 #include "tests/identify/says.hpp"
-#include "tests/slow_build.hpp"
 
 namespace {
 
@@ -75,8 +74,7 @@ TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {
   says(r.out, "housing_degC was filled in by repeating between readings about 1 s apart");
 }
 
-TEST(BadInput, ALoadThatNeverChanges) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, ALoadThatNeverChanges) {
   const auto as_it_is = [](auto&, int) { return true; };
   tests::BenchOptions options;
   options.current_A = [](double, std::mt19937_64&) { return 2.0; };
@@ -97,8 +95,7 @@ TEST(BadInput, NoTemperatureBeforeWhatIsHeldOut) {
   says(r.out, "no temperature is read in its 675 s; hold out less");
 }
 
-TEST(BadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
   // A housing of twenty minutes over five: a third mass was named of a sensor that feels the winding.
   tests::HiddenLogOptions o;
   o.core = tests::Core::none;
@@ -119,16 +116,14 @@ TEST(BadInput, ShorterThanTheHousingsTimeConstant) {
   refused(spoilt([](auto&, int row) { return row < 1200; }), "less than the housing's time constant");
 }
 
-TEST(BadInput, TimeInMilliseconds) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, TimeInMilliseconds) {
   const auto in_ms = [](auto& row, int number) { return row[0] = std::to_string(number * 100), true; };
   refused(spoilt(in_ms), "check the units of current and time");
   const Outcome without_sheet = run(spoilt(in_ms));
   says(without_sheet.out, "--column time_s=COLUMN:ms");
 }
 
-TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, TimeInMillisecondsOfAMotorThatHasACause) {
   tests::BenchOptions options;
   options.extra_housing_W = [](double, double current, double) { return 0.6 * current * current; };
   const Outcome r =
@@ -137,8 +132,7 @@ TEST(BadInput, TimeInMillisecondsOfAMotorThatHasACause) {
   says(r.out, "--column time_s=COLUMN:ms");
 }
 
-TEST(BadInput, TimeInMinutes) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, TimeInMinutes) {
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
   const Outcome r = run(spoilt(in_min) + " --explain");
   says(r.out, "Verdict: insufficient");
@@ -146,8 +140,7 @@ TEST(BadInput, TimeInMinutes) {
   says(r.out, "The two-resistor model was fitted; what it leaves is");
 }
 
-TEST(BadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {
   tests::BenchOptions options;
   options.motor = {0.75, 0.00393, 1.0, 8, 0.6, 0.9};
   options.white_K = 0.05;
@@ -162,8 +155,7 @@ TEST(BadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {
   EXPECT_EQ(report.sentence.find("as that of no motor does"), std::string::npos) << report.sentence;
 }
 
-TEST(BadInput, TheSheetOfAnotherMotor) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, TheSheetOfAnotherMotor) {
   const auto as_it_is = [](auto&, int) { return true; };
   const Outcome near = run(spoilt(as_it_is) + " --motor ec-powermax-30-48v");
   says(near.out, "times the sheet's; see whether maxon EC-powermax 30");
@@ -180,8 +172,7 @@ TEST(BadInput, APauseInWhichTheMotorRanOn) {
   says(r.out, "Nothing tells the heat input for 60 s from 400 s");
 }
 
-TEST(BadInput, RowsTooFarApartForTheLoadThatTheyTell) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, RowsTooFarApartForTheLoadThatTheyTell) {
   tests::BenchOptions options;
   options.core_every_s = 2;
   options.seconds = 3600;
@@ -202,9 +193,9 @@ TEST(BadInput, WhereNothingIsLeftTheLoadBetweenRowsIsNoReason) {
   const auto refusal = [&] {
     const auto logs = tests::bench_logs({options});
     const auto problem = identify::problem_of(logs, motor);
-    identify::Search found;
+    identify::Found found;
     found.verdict = identify::Verdict::unknown_cause;
-    found.base.fit = found.chosen.fit = identify::fit(problem, {});
+    found.baseline.fit = found.chosen.fit = identify::fit(problem, {});
     return identify::too_sparse(problem, found, logs);
   };
   EXPECT_EQ(refusal(), "");
@@ -227,8 +218,7 @@ TEST(BadInput, ATemperatureReadEightTimes) {
           "8 readings of a temperature are too few");
 }
 
-TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, CausesThatAColumnIsMissingForAreNamed) {
   const Outcome r = run(spoilt([](auto& row, int) { return row[2] = "", true; }) + " --motor ec-16-40w --explain");
   EXPECT_EQ(r.code, 0);
   says(r.out, "Not tried, since a column does not tell: speed_rad_per_s is missing (speed_loss_linear, ");
@@ -237,8 +227,7 @@ TEST(BadInput, CausesThatAColumnIsMissingForAreNamed) {
   says(stands.out, "speed_rad_per_s never moves (");
 }
 
-TEST(BadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, ASpeedThatMovesBesideAPowerIsNotSaidToStand) {
   tests::BenchOptions options;
   options.power_gain = 1;
   auto logs = tests::bench_logs({options});
@@ -256,8 +245,7 @@ std::string fahrenheit(const std::string& degC) {
   return degC.empty() ? "" : std::to_string(std::stod(degC) * 1.8 + 32);
 }
 
-TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
   refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), true; }),
           "--column housing_degC=COLUMN:degF");
   refused(spoilt([](auto& row, int) { return row[5] = fahrenheit(row[5]), true; }), "--column core_degC=COLUMN:degF");
@@ -265,8 +253,7 @@ TEST(BadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
           "--column housing_degC=COLUMN:degF --column core_degC=COLUMN:degF");
 }
 
-TEST(BadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
   double sensor_degC = NAN;
   refused(spoilt([&](auto& row, int) {
             const double housing_degC = std::stod(row[3]);
@@ -279,8 +266,7 @@ TEST(BadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
           "--column core_degC=COLUMN:degF");
 }
 
-TEST(BadInput, CurrentAndSpeedSwapped) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, CurrentAndSpeedSwapped) {
   refused(spoilt([](auto& row, int number) {
             row[2] = row[1];
             row[1] = number / 300 % 2 == 0 ? "0" : "2.5";
@@ -289,8 +275,7 @@ TEST(BadInput, CurrentAndSpeedSwapped) {
           "follow the square of the speed column and not that of the current: the two columns are swapped");
 }
 
-TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLog) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowBadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLog) {
   const auto speed_rad_per_s = [](double t) { return std::fmod(t, 200) < 100 ? 2 : 0.5; };
   tests::BenchOptions options;
   options.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 130) < 60 ? 0.4 : 0.1; };
@@ -304,9 +289,9 @@ TEST(BadInput, CurrentAndSpeedAreNotSwappedWhereTheSetThatWasChosenExplainsTheLo
     out.fit = identify::fit(problem, {{identify::cause_named(id)}});
     return out;
   };
-  identify::Search found;
+  identify::Found found;
   found.verdict = identify::Verdict::explained;
-  found.two_resistors = found.base.fit = identify::fit(problem, {});
+  found.plain_baseline = found.baseline.fit = identify::fit(problem, {});
   found.singles = {fitted("sensor_offset")};
   found.chosen = found.singles.front();
   EXPECT_NE(identify::suspicion(problem, found, logs, std::nullopt).find("the two columns are swapped"),

@@ -16,7 +16,6 @@
 #include "tests/identify/program.hpp"
 #include "tests/identify/says.hpp"
 #include "tests/identify/traction.hpp"
-#include "tests/slow_build.hpp"
 
 namespace {
 
@@ -44,8 +43,7 @@ TEST(Traction, AMinuteSaysNothingOfAMotorWithoutASheet) {
   says(report.sentence, "does not come near where it settles");
 }
 
-TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowTraction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
   const identify::Report report = foretold(37);
   EXPECT_EQ(report.verdict, Verdict::ambiguous) << report.sentence;
   EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
@@ -55,14 +53,12 @@ TEST(Traction, AHeavyWindingIsNoSwappedColumnWhereTheLogReadsWorseSwapped) {
   EXPECT_EQ(hot_spot->parameters[0].unit, "J/K / ohm") << "no sheet says the resistance";
 }
 
-TEST(Traction, TwoHoursAreNotTooShortForAHousingThatSettlesWithinMinutes) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowTraction, TwoHoursAreNotTooShortForAHousingThatSettlesWithinMinutes) {
   // Two resistors, which miss the iron loss, take its time constant for 46,000 s, and for determined.
   EXPECT_EQ(foretold(87).sentence.find("record longer"), std::string::npos);
 }
 
-TEST(Traction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowTraction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
   const identify::Report report = foretold(4);
   EXPECT_EQ(report.verdict, Verdict::unknown_cause) << report.sentence;
   EXPECT_TRUE(report.causes.empty());
@@ -70,15 +66,13 @@ TEST(Traction, WhereNothingExplainsALogTheNearestSetIsTriedOnWhatWasHeldOut) {
   EXPECT_LT(report.held_out->after.core_K, 0.5 * report.held_out->before.core_K);
 }
 
-TEST(Traction, IronLossThatBendsTwoResistorsBeyondTheirBoundsDoesNotBendWhereCausesStart) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowTraction, IronLossThatBendsTwoResistorsBeyondTheirBoundsDoesNotBendWhereCausesStart) {
   const identify::Belief b =
       identify::problem_of(tests::traction_drives("hotcore_bent.csv", 13, 5), std::nullopt).belief;
   EXPECT_LT(b.R2_K_per_W * b.C2_J_per_K, 1000) << "s, of a yoke that settles within minutes; 6.5e7 by two resistors";
 }
 
-TEST(Traction, ASlowWindingRecordedForHoursIsReadInLongBins) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowTraction, ASlowWindingRecordedForHoursIsReadInLongBins) {
   const auto logs = tests::traction_drives("hotcore_hours.csv", 4, 5);
   const identify::Problem problem = identify::problem_of(logs, std::nullopt);
   identify::Problem fine = problem;
@@ -104,8 +98,7 @@ TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
   EXPECT_LT(j["baseline"]["rmse_K"]["core"], 6);
 }
 
-TEST(MeasuredData, AFanMakesNoSessionTooShort) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, AFanMakesNoSessionTooShort) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const auto said = [&](const std::string& runs) { return run(runs + " --map " + maps + "tass.toml").out; };
   // The fan run determines its own time constant, about 420 s, and the session is longer; the still-air runs' is 2150
@@ -131,8 +124,7 @@ bool tied(const json& j, const std::vector<std::string>& ids) {
   return std::find(j["tied"].begin(), j["tied"].end(), json(ids)) != j["tied"].end();
 }
 
-TEST(MeasuredData, EveryAnswerHoldsTheFanAndTheJointModelMissesByFiveKelvin) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, EveryAnswerHoldsTheFanAndTheJointModelMissesByFiveKelvin) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const json j = answer(data + "tass_run1.csv " + data + "tass_run3.csv " + data + "tass_run4_fan.csv --map " + maps +
                         "tass.toml");
@@ -144,8 +136,7 @@ TEST(MeasuredData, EveryAnswerHoldsTheFanAndTheJointModelMissesByFiveKelvin) {
   says(j["causes"][0]["name"], "tass_run4_fan");
 }
 
-TEST(MeasuredData, AtOneSpeedHeatThatDoesNotFollowTheCurrentIsNoMoreThanThat) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, AtOneSpeedHeatThatDoesNotFollowTheCurrentIsNoMoreThanThat) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const json& j = paderborn();
   EXPECT_EQ(j["verdict"], "ambiguous");
@@ -155,8 +146,7 @@ TEST(MeasuredData, AtOneSpeedHeatThatDoesNotFollowTheCurrentIsNoMoreThanThat) {
   EXPECT_LT(j["rmse_with_causes_K"]["housing"], 0.85);
 }
 
-TEST(MeasuredData, AtOneCurrentAndOneSpeedCopperAndSpeedLossCannotBeToldApart) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, AtOneCurrentAndOneSpeedCopperAndSpeedLossCannotBeToldApart) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   std::ifstream whole(data + "paderborn_groupA.csv");
   const std::string path = (std::filesystem::temp_directory_path() / "hotcore_74_minutes.csv").string();
@@ -171,8 +161,7 @@ TEST(MeasuredData, AtOneCurrentAndOneSpeedCopperAndSpeedLossCannotBeToldApart) {
       << j["sentence"];
 }
 
-TEST(MeasuredData, TwoCausesForetellTheQuarterThatWasNotFitted) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, TwoCausesForetellTheQuarterThatWasNotFitted) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const json j = answer(data + "paderborn_groupA.csv --map " + maps + "paderborn.toml --hold-out 0.25");
   EXPECT_GT(j["held_out"]["rmse_before_K"]["core"], 10);
@@ -180,8 +169,7 @@ TEST(MeasuredData, TwoCausesForetellTheQuarterThatWasNotFitted) {
   EXPECT_LE(j["causes"].size(), 2u);
 }
 
-TEST(MeasuredData, CoppersCoefficientMakesPaderbornWorse) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowMeasuredData, CoppersCoefficientMakesPaderbornWorse) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const json& j = paderborn();
   ASSERT_EQ(j["baseline"]["variants"].size(), 2u);

@@ -18,7 +18,6 @@
 #include "identify/parallel.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
-#include "tests/slow_build.hpp"
 
 namespace {
 
@@ -46,8 +45,7 @@ TEST(Program, BadDataEndsWithThreeAndWritesNothing) {
   EXPECT_FALSE(std::filesystem::exists(json_path));
 }
 
-TEST(Program, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowProgram, NoBoardGetsASetOfALogThatCannotTellOrThatTellsAPower) {
   const std::string model = (std::filesystem::temp_directory_path() / "hotcore_no_model.toml").string();
   const auto asked = [&](const tests::BenchOptions& options) {
     std::filesystem::remove(model);
@@ -133,8 +131,7 @@ TEST(Program, ColumnsMayFollowOneWord) {
   EXPECT_EQ(run("--column ambient_degC=sky coolant_degC=sea").code, 2) << "no log";
 }
 
-TEST(Program, AScoreEndsWithWhatWasTakenForWhat) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowProgram, AScoreEndsWithWhatWasTakenForWhat) {
   tests::BenchOptions options;
   options.core_every_s = 20;
   const std::string clean = tests::write_bench_log("hotcore_scored.csv", options);

@@ -17,7 +17,6 @@
 #include "identify/problem.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
-#include "tests/slow_build.hpp"
 
 namespace {
 
@@ -92,8 +91,7 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   EXPECT_GT(scored.before.core_K, 2);
 }
 
-TEST(Report, TwoEntriesOfOneIdAreToldApart) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, TwoEntriesOfOneIdAreToldApart) {
   tests::BenchOptions draught, fan;
   for (auto* o : {&draught, &fan}) o->core_every_s = 20;
   fan.motor.R2 /= 4;
@@ -110,8 +108,7 @@ TEST(Report, TwoEntriesOfOneIdAreToldApart) {
   says(report.gain->like, "cooling_change at a moment");
 }
 
-TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
   tests::BenchOptions fitted, held_out;
   for (auto* o : {&fitted, &held_out}) o->core_every_s = 20;
   held_out.seed = 2;
@@ -132,8 +129,7 @@ TEST(Report, WhatWasHeldOutMaySpeakAgainstTheAnswer) {
   says(sentence(), "do not rely on it");
 }
 
-TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousing) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousing) {
   tests::BenchOptions options;
   options.seconds = 2400;
   EXPECT_EQ(identify::discover(tests::bench_logs({options}), tests::ec_16()).core_refusal, "");
@@ -145,8 +141,7 @@ TEST(Report, WhereTheHeatDoesNotDependOnTheWindingNoWindingIsStatedFromTheHousin
   EXPECT_FALSE(report.gain);
 }
 
-TEST(Report, EachOfTwoCausesHasEvidenceOfItsOwnAndTheNextBestInItsPlace) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, EachOfTwoCausesHasEvidenceOfItsOwnAndTheNextBestInItsPlace) {
   tests::BenchOptions options;
   options.core_every_s = 20;
   options.seconds = 1800;
@@ -168,8 +163,7 @@ TEST(Report, EachOfTwoCausesHasEvidenceOfItsOwnAndTheNextBestInItsPlace) {
   EXPECT_GT(alone, 10);
 }
 
-TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   tests::BenchOptions one, other;
   for (auto* o : {&one, &other}) o->core_every_s = 2;
   one.power_gain = 1;
@@ -184,8 +178,7 @@ TEST(Report, APowerOfWhichTheWindingGetsAnotherShareInOneLogIsNamed) {
   EXPECT_EQ(identify::discover(tests::bench_logs({one, other}), tests::ec_16()).verdict, Verdict::adequate);
 }
 
-TEST(Report, ACurrentThatOneLogScalesOtherwiseIsNamed) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, ACurrentThatOneLogScalesOtherwiseIsNamed) {
   tests::BenchOptions one, other;
   for (auto* o : {&one, &other}) o->core_every_s = 2;
   other.seed = 2;
@@ -274,8 +267,7 @@ TEST(Report, WhatOnlyOneLogHasIsSaidOfTheOthers) {
             1);
 }
 
-TEST(Report, LogsOfOneNameAreToldApartByTheirFolders) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, LogsOfOneNameAreToldApartByTheirFolders) {
   tests::BenchOptions options;
   options.seconds = 120;
   auto logs = tests::bench_logs({options, options, options});
@@ -323,8 +315,7 @@ TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
   EXPECT_EQ(report.model_toml.find("gain = -"), std::string::npos) << "heat out of the housing, for a board";
 }
 
-TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
   int seen = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     tests::BenchOptions options;
@@ -350,8 +341,7 @@ TEST(Report, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
   EXPECT_GE(seen, 2) << "of four that are told a still room: what this test is about";
 }
 
-TEST(Report, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
   double most = 0, most_of_curvature = 0;
   for (const double exponent : {0.05, 0.1}) {
     tests::BenchOptions options;
@@ -376,8 +366,7 @@ TEST(Report, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
   EXPECT_GT(most_of_curvature, 3) << "what this test is about";
 }
 
-TEST(Report, ALateSensorInTheWindingIsNamedAndTheMotorBehindItFound) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, ALateSensorInTheWindingIsNamedAndTheMotorBehindItFound) {
   for (const double lag_s : {0.0, 2.0, 8.0}) {
     tests::BenchOptions options;
     options.seconds = 1800;
@@ -447,8 +436,7 @@ TEST(Report, WhatIsAdequateHasNothingToGain) {
   EXPECT_FALSE(report.gain);
 }
 
-TEST(Report, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
   tests::BenchOptions options;
   options.motor.R1 = 0.69;
   options.motor.R2 = 11.8;
@@ -465,8 +453,7 @@ TEST(Report, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
 }
 
 /// As an inverter's logger averages: what flowed in the five seconds before a row, beside a winding of 50 s.
-TEST(Report, ARowsLoadMayBeWhatFlowedBeforeIt) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, ARowsLoadMayBeWhatFlowedBeforeIt) {
   tests::BenchOptions options;
   options.motor = {.ohm = 0.75, .R1 = 1.0, .R2 = 4.0, .C1 = 50, .C2 = 300};
   options.rate_Hz = 0.2;
@@ -491,8 +478,7 @@ tests::BenchOptions fast_winding() {
   return options;
 }
 
-TEST(Report, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
   tests::BenchOptions options = fast_winding();
   options.sensor_share = 0.15;
   options.rate_Hz = 1;
@@ -502,8 +488,7 @@ TEST(Report, ASensorThatFeelsALittleOfAFastWindingIsBelievedAsAHousingIs) {
   }
 }
 
-TEST(Report, RowsMayBeBehindWhereASensorIsToo) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, RowsMayBeBehindWhereASensorIsToo) {
   tests::BenchOptions options = fast_winding();
   options.sensor_share = 0.15;
   options.rate_Hz = 0.5;
@@ -517,8 +502,7 @@ TEST(Report, RowsMayBeBehindWhereASensorIsToo) {
   }
 }
 
-TEST(Report, NothingIsCalledConvergedThatFailsACheck) {
-  if (slow_build) GTEST_SKIP() << "skipped: minutes with sanitizers";
+TEST(SlowReport, NothingIsCalledConvergedThatFailsACheck) {
   tests::BenchOptions options;
   options.core_every_s = 20;
   options.seconds = 600;

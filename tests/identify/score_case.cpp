@@ -15,7 +15,7 @@
 namespace tests {
 namespace {
 
-using identify::Fit, identify::Problem, identify::Search, identify::Verdict;
+using identify::Fit, identify::Problem, identify::Found, identify::Verdict;
 
 constexpr double row_s = 0.1;
 
@@ -39,7 +39,7 @@ double core_error_K(const Problem& problem, const Fit& fit, const std::vector<do
   return std::sqrt(sum / std::max(n, 1));
 }
 
-void measure_gain(const CaseOptions& options, const HiddenLog& log, const Problem& problem, const Search& found,
+void measure_gain(const CaseOptions& options, const HiddenLog& log, const Problem& problem, const Found& found,
                   const std::string& path, CaseResult& result) {
   HiddenLogOptions other = options.log;
   other.again = 1;
@@ -47,13 +47,13 @@ void measure_gain(const CaseOptions& options, const HiddenLog& log, const Proble
   Problem unseen = problem;
   unseen.logs = identify::problem_of(read(log, path), log.sheet).logs;
   const bool extends = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
-  result.core_before_K = core_error_K(unseen, identify::transferred(unseen, found.base.fit), second.core_degC);
+  result.core_before_K = core_error_K(unseen, identify::transferred(unseen, found.baseline.fit), second.core_degC);
   result.core_after_K = extends
                             ? core_error_K(unseen, identify::transferred(unseen, found.chosen.fit), second.core_degC)
                             : *result.core_before_K;
 }
 
-void check_parameters(const HiddenLog& log, const Problem& problem, const Search& found, CaseResult& result) {
+void check_parameters(const HiddenLog& log, const Problem& problem, const Found& found, CaseResult& result) {
   if (result.outcome() != Outcome::right) return;
   const Fit& fit = found.chosen.fit;
   for (std::size_t c = 0; c < fit.chosen.size(); ++c) {
@@ -135,7 +135,7 @@ double separability(const Problem& clean, const std::vector<std::string>& truth,
 
 /// Plays the advised experiment once and asks again with both logs.
 void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<identify::Log>& first,
-            const Problem& problem, const Search& found, const std::string& path, CaseResult& result) {
+            const Problem& problem, const Found& found, const std::string& path, CaseResult& result) {
   const auto advice = identify::experiment(problem, found);
   if (!advice) return;
   HiddenLogOptions bench = options.log;
@@ -147,7 +147,7 @@ void follow(const CaseOptions& options, const HiddenLog& log, const std::vector<
   for (identify::Log& more : read(log, path)) both.push_back(std::move(more));
   CaseResult again;
   Problem joint = identify::problem_of(both, log.sheet);
-  const Search now = identify::search(joint, options.margins, options.removed);
+  const Found now = identify::search(joint, options.margins, options.removed);
   again.truth = result.truth;
   again.verdict = now.verdict;
   again.answer = now.tied;
@@ -187,13 +187,13 @@ CaseResult play(const CaseOptions& options, const std::string& path) {
   std::sort(result.truth.begin(), result.truth.end());
   const std::clock_t start = std::clock();
   Problem problem = identify::problem_of(logs, options.blind ? std::nullopt : std::optional(log.sheet));
-  const Search found = identify::search(problem, options.margins, options.removed);
+  const Found found = identify::search(problem, options.margins, options.removed);
   result.search_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.verdict = found.verdict;
   result.answer = found.tied;
   result.steps = found.steps;
   result.remarks = fmt::format("{} {:.1f} K, ratio {:.2f} -> {:.2f};", log.sheet.name, log.core_error_K,
-                               found.base.ratio, found.chosen.ratio);
+                               found.baseline.ratio, found.chosen.ratio);
   if (!options.blind) check_parameters(log, problem, found, result);
   if (options.separability) {
     const bool outside = identify::cause_named(result.truth.front()) < 0;

@@ -64,4 +64,13 @@ inline std::string nearest_option(const CLI::App& app) {
   return "";
 }
 
+/// `call`: how the program's help is asked for.
+inline void use_help(CLI::App& app, const std::string& call) {
+  app.formatter(std::make_shared<Help>());
+  app.failure_message([call](const CLI::App* of, const CLI::Error& error) {
+    const std::string hint = nearest_option(*of);
+    return error.what() + (hint.empty() ? ";" : hint) + " " + call + " lists what there is.\n";
+  });
+}
+
 }  // namespace wire::pc

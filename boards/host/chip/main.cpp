@@ -9,8 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "boards/host/chip/play.hpp"
-#include "wire/pc/files.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -33,11 +32,7 @@ int run(const std::string& name, const std::vector<std::string>& overrides, cons
   });
   if (show) fmt::print(stderr, "\r\033[K");
   const std::string folder = out + "/" + scene.id;
-  for (const host::Trace& trace : play.result.traces) {
-    wire::pc::write_whole(fmt::format("{}/{}{}.csv", folder, name_of(trace.limiter), trace.axis == 0 ? "" : "-axis1"),
-                          csv(play.result, trace));
-  }
-  draw(play.result, fmt::format("{}/{}.svg", folder, scene.id));
+  write_files(play.result, folder);
   const double speed = play.result.simulated_s / play.wall_s;
   if (json) {
     nlohmann::json j = nlohmann::json::parse(summary_json(play.result));
@@ -81,13 +76,7 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "folder for logs and picture")->capture_default_str();
   app.add_flag("--json", json, "the summary as JSON on standard output");
   try {
-    app.parse(argc, argv);
-    return run(scene, overrides, elf, out, json);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const wire::pc::UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
+    return wire::pc::run_program(app, argc, argv, [&] { return run(scene, overrides, elf, out, json); });
   } catch (const std::runtime_error& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;

@@ -6,20 +6,19 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
-#include <numbers>
 
 #include "boards/h8-15d/board.hpp"
 #include "boards/host/chip/pcb.hpp"
+#include "boards/host/stage.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace boards {
 namespace {
 
+using host::warm_up_s;
 using host_sim::chip::to_s;
 
-constexpr double root_3_over_2 = std::numbers::sqrt3 / 2;
-constexpr double warm_up_s = 1;  // as host-sim: offsets learnt, housing heard
 constexpr int adc_exception = 16 + 18;
 
 double counts_to_degC(double counts) {
@@ -37,32 +36,17 @@ std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, 
     wire::pc::refuse("The chip model has the board h8-15d only; use host-sim for " + scene.board + ".");
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, motor_folder);
 
-  host_sim::HeatOptions heat;
-  heat.coolant_R2_K_per_W = scene.coolant_K_per_W;
-  host_sim::BenchDesign design;
-  for (host_sim::AxisDesign& axis : design.axes) axis = host_sim::axis_from_sheet(file.motor, heat);
+  host_sim::BenchDesign design = bench_of(scene, file.motor);
   design.sensors = h8_15d_sensors();
-  design.supply.open_V = scene.supply_V;
-  design.supply.can_sink = scene.supply_sinks;
-  design.start_degC = scene.start_degC;
-  design.ambient_degC = scene.ambient_degC;
   const wire::Motor known = host_sim::true_sheet(file.motor, design.axes[0].heat);
 
   auto pcb = std::make_unique<Pcb>(design, scene.seed);
   pcb->flash_image(elf);
-  const thermal::Trust& trust = scene.trust == "sheet"        ? thermal::sheet_trust
-                                : scene.trust == "identified" ? thermal::identified_trust
-                                                              : thermal::exact_trust;
   const firmware::AxisSet set{
       firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f}),
-      firmware::heat_parameters_from(known, trust)};
+      firmware::heat_parameters_from(known, trust_of(scene))};
   pcb->flash_parameters({set, set});
-  for (int axis = 0; axis < 2; ++axis) {
-    host_sim::Load& load = pcb->bench.load(axis);
-    if (scene.shaft.kind == host::Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
-    if (scene.shaft.kind == host::Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
-    load.inertia_kg_m2 = scene.shaft.load_inertia_kg_m2;
-  }
+  for (int axis = 0; axis < 2; ++axis) pcb->bench.load(axis) = load_of(scene.shaft);
   return pcb;
 }
 
@@ -84,18 +68,11 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
                      pcb.chip.report_text());
   }
 
-  const bool two_axes =
-      std::any_of(scene.demands.begin(), scene.demands.end(), [](const host::Demand& d) { return d.axis == 1; });
   ChipPlay play;
-  play.result = {.scene = scene,
-                 .motor_name = file.name + ", on the chip model",
-                 .surrogate = file.surrogate,
-                 .winding_max_degC = file.motor.winding_max_degC,
-                 .optimal_impulse_As = 0,
-                 .traces = {}};
+  play.result = result_of(scene, file);
+  play.result.motor_name += ", on the chip model";
   play.result.scene.limiters = {host::Limiter::governor};
-  for (int axis = 0; axis < (two_axes ? 2 : 1); ++axis)
-    play.result.traces.push_back({host::Limiter::governor, axis, {}});
+  for (int axis = 0; axis < axes_of(scene); ++axis) play.result.traces.push_back({host::Limiter::governor, axis, {}});
   pcb.chip.core().clear_counts();
   const double first_s = to_s(pcb.chip.now());
   const int log_ms = std::max(1, static_cast<int>(std::lround(1000 / scene.log_Hz)));
@@ -108,10 +85,8 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
     for (const host::Trace& t : play.result.traces)
       pcb.set_current(t.axis, 0.0f, static_cast<float>(host::demand_A(scene, t.axis, time_s)));
     if (scene.shaft.kind == host::Shaft::Kind::imposed) {
-      const double w =
-          scene.shaft.speed_rad_per_s +
-          scene.shaft.speed_amplitude_rad_per_s * std::sin(2 * std::numbers::pi * scene.shaft.frequency_Hz * time_s);
-      for (int axis = 0; axis < 2; ++axis) pcb.bench.load(axis).speed_rad_per_s = w;
+      for (int axis = 0; axis < 2; ++axis)
+        pcb.bench.load(axis).speed_rad_per_s = imposed_speed_rad_per_s(scene, time_s);
     }
     if (!landings.empty() && time_s >= landings.front()) {
       for (int axis = 0; axis < 2; ++axis) pcb.bench.motor(axis).place(pcb.bench.motor(axis).angle_rad(), 0);
@@ -145,15 +120,14 @@ ChipPlay play_on_chip(const host::Scene& scene, const std::string& elf, const st
       row.id_now_A = truth.current_d_A;
       row.iq_now_A = truth.current_q_A;
       row.iq_A = currents[t.axis] / summed;
-      row.current_A = root_3_over_2 * std::sqrt(squares[t.axis] / summed);
+      row.current_A = wire::direct_per_amplitude * std::sqrt(squares[t.axis] / summed);
       row.speed_rad_per_s = speeds[t.axis] / summed;
       row.torque_Nm = torques[t.axis] / summed;
       row.shaft_W = shafts[t.axis] / summed;
       row.bus_V = pcb.bench.bus_V();
       row.bus_A = static_cast<double>(door.bus_A);
       row.depth_ratio = host::modulation_depth(pcb.duty(t.axis));
-      row.estimated_core_degC =
-          static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
+      row.estimated_core_degC = host::hottest_degC(state);
       row.core_sigma_K = static_cast<double>(state.core_sigma_K);
       row.true_core_degC = truth.hottest_degC;
       row.housing_degC = counts_to_degC(pcb.bench.raw(t.axis).housing_counts);

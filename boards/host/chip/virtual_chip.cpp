@@ -8,7 +8,7 @@
 #include "boards/host/chip/cable.hpp"
 #include "boards/host/chip/play.hpp"
 #include "boards/host/usbip/server.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -45,13 +45,7 @@ int main(int argc, char** argv) {
   app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   try {
-    app.parse(argc, argv);
-    return run(scene, elf, port, json);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const wire::pc::UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
+    return wire::pc::run_program(app, argc, argv, [&] { return run(scene, elf, port, json); });
   } catch (const std::runtime_error& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;

@@ -12,7 +12,7 @@
 #include "boards/host/usbip/server.hpp"
 #include "boards/host/virtual/virtual_board.hpp"
 #include "wire/pc/motor_file.hpp"
-#include "wire/pc/user_error.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -98,8 +98,7 @@ int main(int argc, char** argv) {
   app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   if (std::find(argv, argv + argc, std::string("--chip")) != argv + argc) return become_chip(argv);
-  try {
-    app.parse(argc, argv);
+  return wire::pc::run_program(app, argc, argv, [&] {
     boards::host::VirtualBoardOptions options;
     options.motor = wire::pc::read_motor(motor, std::string(HOTCORE_SOURCE_DIR) + "/boards/motors").motor;
     options.serial = serial;
@@ -107,10 +106,5 @@ int main(int argc, char** argv) {
     boards::host::VirtualBoard board(options);
     Cable cable(board);
     return usb::serve_until_interrupted(cable, port, json);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const wire::pc::UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return error.exit_code();
-  }
+  });
 }

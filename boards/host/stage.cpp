@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#include "boards/host/stage.hpp"
+
+#include <algorithm>
+
+namespace boards::host {
+
+host_sim::HeatOptions heat_options(const Scene& scene) {
+  host_sim::HeatOptions options;
+  options.coolant_R2_K_per_W = scene.coolant_K_per_W;
+  return options;
+}
+
+host_sim::BenchDesign bench_of(const Scene& scene, const wire::Motor& motor) {
+  host_sim::BenchDesign design;
+  for (host_sim::AxisDesign& axis : design.axes) axis = host_sim::axis_from_sheet(motor, heat_options(scene));
+  design.supply.open_V = scene.supply_V;
+  design.supply.can_sink = scene.supply_sinks;
+  design.start_degC = scene.start_degC;
+  design.ambient_degC = scene.ambient_degC;
+  return design;
+}
+
+host_sim::Load load_of(const Shaft& shaft) {
+  host_sim::Load load;
+  if (shaft.kind == Shaft::Kind::locked) load.mode = host_sim::Load::Mode::locked;
+  if (shaft.kind == Shaft::Kind::imposed) load.mode = host_sim::Load::Mode::imposed_speed;
+  load.inertia_kg_m2 = shaft.load_inertia_kg_m2;
+  return load;
+}
+
+thermal::Trust trust_of(const Scene& scene, const thermal::Trust& of_the_model) {
+  return scene.trust == "sheet"        ? thermal::sheet_trust
+         : scene.trust == "identified" ? of_the_model
+                                       : thermal::exact_trust;
+}
+
+int axes_of(const Scene& scene) {
+  return std::any_of(scene.demands.begin(), scene.demands.end(), [](const Demand& d) { return d.axis == 1; }) ? 2 : 1;
+}
+
+Result result_of(const Scene& scene, const wire::pc::MotorFile& file) {
+  return {.scene = scene,
+          .motor_name = file.name,
+          .surrogate = file.surrogate,
+          .winding_max_degC = file.motor.winding_max_degC,
+          .optimal_impulse_As = 0,
+          .traces = {}};
+}
+
+double hottest_degC(const firmware::AxisState& state) {
+  return static_cast<double>(std::max({state.core_degC[0], state.core_degC[1], state.core_degC[2]}));
+}
+
+}  // namespace boards::host
