@@ -202,6 +202,19 @@ void note_still_ambient(const std::vector<Log>& logs, Report& report) {
         "change of cooling.");
 }
 
+/// What a loop controls and what is sampled with the pulses is the mean between them.
+void note_unseen_ripple(const std::vector<Log>& logs, Report& report) {
+  for (const Log& log : logs) {
+    const bool phases = log.has(Role::phase_a);
+    if (heat_of(log) != Role::iq && !phases) continue;
+    report.notes.push_back(fmt::format(
+        "{} {} not tell the ripple of the pulses, which heats as well and grows with voltage and speed; of a motor of "
+        "small inductance it may be all that is missing. Record an rms current beside it (current_A).",
+        phases ? "Currents sampled in the phases" : "iq_A", phases ? "may" : "does"));
+    return;
+  }
+}
+
 /// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
 /// times the rating, an ordinary overload for seconds.
 double most_A(const Problem& problem, const std::optional<wire::pc::MotorFile>& motor) {
@@ -237,30 +250,41 @@ void compare_columns(const std::vector<Log>& logs, Report& report) {
   }
 }
 
+/// Two resistors as the motor's sheet has them, in place of those that were fitted.
+Fit of_the_sheet(const Problem& problem, Fit fitted) {
+  const Belief& sheet = problem.belief;
+  fitted.x.head(4) << std::log(sheet.R1_K_per_W), std::log(sheet.R2_K_per_W), std::log(sheet.C1_J_per_K),
+      std::log(sheet.C2_J_per_K);
+  return fitted;
+}
+
 /// What a board is given. Where the data cannot choose, it must not take the milder model for true: of sets that tie or
 /// are nearly as good as the named one, and of two resistors and what is likelier by the log and only too little to be
 /// named, it gets the one that bears a push the shortest. Where nothing explains the log, no fit is worth more than a
-/// sheet.
+/// sheet: of the sheet itself, too.
 Offer for_the_board(const Problem& problem, const Found& found, const Fit& best, Report& report) {
   const bool unexplained = found.verdict == Verdict::unknown_cause || found.verdict == Verdict::insufficient;
   const thermal::Trust trust = trust_of(problem, best, unexplained ? thermal::sheet_trust : thermal::identified_trust);
-  std::vector<Offer> open = {{&best, trust}};
+  std::vector<Offer> open = {{best, trust}};
   if (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) {
     for (const Candidate& c : found.sets) {
-      if (c.likely) open.push_back({&c.fit, trust_of(problem, c.fit)});
+      if (c.likely) open.push_back({c.fit, trust_of(problem, c.fit)});
     }
   }
   if (found.verdict == Verdict::adequate) {
     for (const Candidate& c : found.singles) {
-      if (c.likely) open.push_back({&c.fit, trust});
+      if (c.likely) open.push_back({c.fit, trust});
     }
   }
+  if (unexplained && problem.belief.known) open.push_back({of_the_sheet(problem, best), thermal::sheet_trust});
   if (open.size() == 1) return open.front();
-  const Offer given = most_cautious(problem, open);
+  Offer given = most_cautious(problem, open);
+  const std::string what = !given.fit.chosen.empty() ? listed(names_of(given.fit.chosen), " and ")
+                           : given.fit.x == best.x   ? "two resistors"
+                                                     : "two resistors of the sheet";
   report.reasoning.push_back(fmt::format(
-      "The model written for the board is, of those that the log bears out about as well, the one that bears a "
-      "push the shortest: {}.",
-      given.fit->chosen.empty() ? "two resistors" : listed(names_of(given.fit->chosen), " and ")));
+      "The model written for the board is, of those that {}, the one that bears a push the shortest: {}.",
+      unexplained ? "nothing speaks for (the fit, and the sheet)" : "the log bears out about as well", what));
   return given;
 }
 
@@ -468,7 +492,10 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   } else {
     report.extended_rmse = rmse_of(problem, answer);
     tell(problem, found, report);
-    if (found.verdict != Verdict::adequate) note_still_ambient(logs, report);
+    if (found.verdict != Verdict::adequate) {
+      note_still_ambient(logs, report);
+      note_unseen_ripple(logs, report);
+    }
     const std::string untried = not_tried(problem, logs);
     if (!untried.empty())
       (found.verdict == Verdict::unknown_cause ? report.notes : report.reasoning).push_back(untried);
@@ -480,8 +507,8 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     // A heat that no longer depends on the winding, say, leaves R1 open.
     if (report.core_refusal.empty()) report.core_refusal = core_refusal(problem, answer);
     doing("playing a push on a board");
-    if (report.core_refusal.empty()) report.gain = gain_of(problem, baseline, *offer.fit);
-    if (report.gain) report.gain->like = listed(names_of(offer.fit->chosen), " and ");
+    if (report.core_refusal.empty()) report.gain = gain_of(problem, baseline, offer.fit);
+    if (report.gain) report.gain->like = listed(names_of(offer.fit.chosen), " and ");
   }
   compare_with_sheet(problem, extended ? report.extended : report.baseline, report);
   if (poor.empty()) {
@@ -503,7 +530,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   shorten_names(report.plots);
   report.no_model = why_no_model(problem, poor);
   if (!report.no_model.empty()) return report;
-  report.model_toml = heat_set_toml(problem, *offer.fit, report.sentence, offer.trust);
+  report.model_toml = heat_set_toml(problem, offer.fit, report.sentence, offer.trust);
   report.baseline_toml = heat_set_toml(problem, baseline, "The two-resistor model as fitted, without what was found.",
                                        trust_of(problem, baseline));
   return report;

@@ -202,7 +202,7 @@ Offer most_cautious(const Problem& problem, const std::vector<Offer>& offers) {
   // One current for all, above what any of them carries for an hour.
   double burst_A = 0, least_A = std::numeric_limits<double>::infinity();
   for (const Offer& offer : offers) {
-    Asked a{&offer, heat_set_of(problem, *offer.fit), 0};
+    Asked a{&offer, heat_set_of(problem, offer.fit), 0};
     if (!thermal::validate(a.set, estimator_dt_s).ok()) continue;
     a.fast_A = answers(a, fast, 0).continuous_A;
     least_A = std::min(least_A, a.fast_A);

@@ -17,7 +17,7 @@ std::optional<Gain> gain_of(const Problem& problem, const Fit& baseline, const F
 
 /// What a board may be given.
 struct Offer {
-  const Fit* fit;
+  Fit fit;
   thermal::Trust trust;
 };
 

@@ -89,16 +89,27 @@ void show(const std::string& text) {
     refuse("standard output: cannot be written; the answer is not complete.");
 }
 
-/// Asked before the search, which may take minutes.
-void need_folder_of(const std::string& path) {
-  const auto folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
-    refuse(fmt::format("{}: there is no folder {}; make it, or choose another place.", path, folder.string()));
+/// Asked before the search, which may take minutes: each has a folder, and none stands in another's place.
+void need_places_to_write(const Arguments& a) {
+  std::vector<std::string> taken = a.logs;
+  taken.insert(taken.end(), {a.hold_out, a.map, a.motor});
+  std::vector<std::string> written = {a.html, a.write_model, a.write_baseline};
+  if (a.json != "-") written.push_back(a.json);
+  for (const std::string& path : written) {
+    if (path.empty()) continue;
+    if (path == "-") refuse("-: only --json writes to standard output; name a file.");
+    const auto folder = std::filesystem::path(path).parent_path();
+    if (!folder.empty() && !std::filesystem::is_directory(folder))
+      refuse(fmt::format("{}: there is no folder {}; make it, or choose another place.", path, folder.string()));
+    if (std::any_of(taken.begin(), taken.end(), [&](const auto& other) { return same_file(path, other); }))
+      refuse(path + ": would be written over what is read or written as well; choose another name.");
+    taken.push_back(path);
+  }
 }
 
 int answer(Arguments a) {
   take_columns_from_logs(a);
-  for (const std::string& path : {a.html, a.json, a.write_model, a.write_baseline}) need_folder_of(path);
+  need_places_to_write(a);
   std::optional<wire::pc::MotorFile> motor;
   if (!a.motor.empty()) {
     const char* folder = std::getenv("HOTCORE_MOTORS");
@@ -171,11 +182,11 @@ int main(int argc, char** argv) {
                  "only the rows in which a column says this, e.g. motor=left, of a log of several motors")
       ->type_name("NAME=VALUE");
   app.add_option("--period", a.period_s, "seconds from row to row, of logs without a time column")
-      ->check(CLI::Range(1e-6, 86400.0))
+      ->check(wire::pc::between(1e-6, 86400.0))
       ->type_name("S");
   app.add_option("--ambient", a.ambient_degC,
                  "how warm the room was, of logs without ambient_degC; else what a log begins at is taken for it")
-      ->check(CLI::Range(-60.0, 100.0))
+      ->check(wire::pc::between(-60.0, 100.0))
       ->type_name("DEGC");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,

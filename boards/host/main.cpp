@@ -185,7 +185,7 @@ int main(int argc, char** argv) {
       ->type_name("MOTOR");
   record_command->add_option("--minutes", recording.minutes, "length of the log, 0.1 to 1440")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 1440.0))
+      ->check(wire::pc::between(0.1, 1440.0))
       ->type_name("MINUTES");
   record_command->add_option("--seed", recording.seed, "of excitation and noise")
       ->capture_default_str()

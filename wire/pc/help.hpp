@@ -2,6 +2,8 @@
 // How the PC programs show their options: in a hundred columns, what an option takes and its default, and no more.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
@@ -46,6 +48,17 @@ class Help : public CLI::Formatter {
     return out;
   }
 };
+
+/// A number within these; CLI::Range lets what is no number through.
+inline CLI::Validator between(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& word) {
+        double x = 0;
+        if (CLI::detail::lexical_cast(word, x) && x >= low && x <= high) return std::string();
+        return fmt::format("{} is not in {:g} to {:g}", word, low, high);
+      },
+      "FLOAT");
+}
 
 /// Of a mistake on the command line: ", did you mean --motor?" where an option is nearly one that there is, or nothing.
 inline std::string nearest_option(const CLI::App& app) {
