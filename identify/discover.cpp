@@ -330,6 +330,7 @@ Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::o
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
   if (poor.empty()) poor = clipped(found, logs);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
+  if (poor.empty()) poor = masses_in_each_others_place(problem, found, logs, motor);
   if (!poor.empty() || !held_out || found.chosen.fit.chosen.empty()) return out;
   const std::string refused = veto(problem, found.baseline.fit, found.chosen.fit);
   vetoed = !refused.empty();

@@ -126,6 +126,15 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
   return logs;
 }
 
+/// The least reading; missing when there is none.
+double least_of(const std::vector<double>& column) {
+  double least = missing;
+  for (const double x : column) {
+    if (!(x >= least)) least = std::isnan(x) ? least : x;
+  }
+  return least;
+}
+
 /// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Found& found, const std::vector<Log>& logs,
@@ -141,9 +150,9 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
     const double left = excess(fit(read, chosen));
     return left + clearly < explained && left < fraction_left * as_it_stands;
   };
-  const auto follows_better = [&](const std::vector<Log>& otherwise) {
+  const auto follows_better = [&](const std::vector<Log>& otherwise, double explained) {
     const Problem read = problem_of(otherwise, motor);
-    return leaves_less(read, {}, by_one) || leaves_less(read, best_alone(read).chosen, by_one);
+    return leaves_less(read, {}, explained) || leaves_less(read, best_alone(read).chosen, explained);
   };
   const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
     return log.has(Role::current) && largest_magnitude(log.of(Role::speed)) > 0;
@@ -165,18 +174,24 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
     return plain.at_bound[static_cast<std::size_t>(i)] && std::exp(plain.x[i]) > believed;
   };
   if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K) &&
-      follows_better(read_in(*unit_named("ms"), {Role::time}, logs)))
+      follows_better(read_in(*unit_named("ms"), {Role::time}, logs), by_one))
     return in_milliseconds;
-  // A column that is ever below 50 would be below 10 degC: no room where motors are measured.
+  // A column that is ever below 50 would be below 10 degC: no room where motors are measured. Nor is what heats colder
+  // than what cools it: a log that begins warm would be.
+  const Unit& degF = *unit_named("degF");
   const auto may_be_fahrenheit = [&](Role role) {
     return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
-      return log.has(role) && std::none_of(log.of(role).begin(), log.of(role).end(), [](double x) { return x < 50; });
+      constexpr double sensors_K = 3;  // two may differ by
+      const double least = least_of(log.of(role)), sink_degC = least_of(log.of(sink_of(log)));
+      return log.has(role) && least >= 50 && !(degF.factor * (least + degF.offset) < sink_degC - sensors_K);
     });
   };
+  // What was found may imitate it, by a gain and an offset, or be what is true.
+  const double explained = std::min(by_one, left_by(found.chosen.fit) + 2 * clearly);
   const std::vector<Role> together[] = {{Role::housing}, {Role::core}, {Role::housing, Role::core}};
   for (const std::vector<Role>& roles : together) {
     if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit) ||
-        !follows_better(read_in(*unit_named("degF"), roles, logs)))
+        !follows_better(read_in(degF, roles, logs), explained))
       continue;
     std::string columns;
     for (const Role role : roles) columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
@@ -233,15 +248,16 @@ double clocks_apart_s(const Problem& problem, const Found& found, const std::vec
   return late_s;
 }
 
-/// With the two temperatures swapped, does one cause leave no more than the best does as they stand?
-bool follows_as_well_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
-                             const std::optional<wire::pc::MotorFile>& motor) {
+/// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?
+bool follows_better_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
+                            const std::optional<wire::pc::MotorFile>& motor) {
   for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
   const Problem swapped = problem_of(logs, motor);
   const auto left_by_best = [&](const Problem& p) { return excess(fit(p, best.chosen, {&best})); };
   const double in_a_look = left_by_best(in_long_bins(problem));
-  return excess(best_alone(in_long_bins(swapped))) < in_a_look + std::abs(in_a_look) + clearly &&
-         excess(best_alone(swapped)) < left_by_best(problem);
+  if (!(excess(best_alone(in_long_bins(swapped))) < in_a_look + std::abs(in_a_look) + clearly)) return false;
+  const double left = left_by_best(problem);
+  return excess(best_alone(swapped)) + clearly < std::min(left, fraction_left * left);
 }
 
 /// As it was told last, and as it is told next, where that is not now.
@@ -420,7 +436,7 @@ std::string suspicion(const Problem& problem, const Found& found, const std::vec
   for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     if (far_too_slow(problem, *f)) return in_milliseconds;
   }
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
   if (const double late_s = clocks_apart_s(problem, found, logs); late_s != 0)
@@ -431,23 +447,7 @@ std::string suspicion(const Problem& problem, const Found& found, const std::vec
     return fmt::format("Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
                        cause_of(best.chosen.front()).parameters[0].high);
   }
-  const std::string misread = misread_columns(problem, found, logs, motor);
-  if (!misread.empty()) return misread;
-  // Asked last: degrees of another size make a winding heavy too, and a conversion that fits says which. So does a
-  // motor that is more than two masses; read the other way round it does not follow the load.
-  const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
-                                [](const Bins& log) { return log.has_core && log.has_housing; });
-  double winding_of_housing = 0;  // a cause may imitate what the other column was
-  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
-    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
-  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
-      follows_as_well_swapped(problem, best, logs, motor)) {
-    return fmt::format(
-        "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
-        "housing_degC are swapped.",
-        winding_of_housing);
-  }
-  return unlike_the_motor(problem, found, logs);
+  return misread_columns(problem, found, logs, motor);
 }
 
 std::string clipped(const Found& found, const std::vector<Log>& logs) {
@@ -502,6 +502,25 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
       "more often.",
       unknown ? "no cause explains" : "was found beside two resistors", asked_K, apart_s,
       problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
+}
+
+std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,
+                                        const std::optional<wire::pc::MotorFile>& motor) {
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
+  const Fit& best = found.singles.front().fit;
+  const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
+                                [](const Bins& log) { return log.has_core && log.has_housing; });
+  double winding_of_housing = 0;  // a cause may imitate what the other column was
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
+    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
+  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
+      follows_better_swapped(problem, best, logs, motor)) {
+    return fmt::format(
+        "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
+        "housing_degC are swapped.",
+        winding_of_housing);
+  }
+  return unlike_the_motor(problem, found, logs);
 }
 
 }  // namespace identify

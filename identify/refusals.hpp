@@ -28,4 +28,9 @@ std::string clipped(const Found& found, const std::vector<Log>& logs);
 /// when not.
 std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs);
 
+/// Does a winding that is too heavy stand for another mass, the housing or none of this motor's? Empty when not. Asked
+/// last: degrees of another size and a load that is not what flowed make a winding heavy too.
+std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,
+                                        const std::optional<wire::pc::MotorFile>& motor);
+
 }  // namespace identify

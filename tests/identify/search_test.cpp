@@ -726,6 +726,19 @@ TEST(SlowReport, AWindingManyTimesItsSheetIsAnotherMassAndNoCauseIsNamedBesideIt
   says(report.sentence, "times its sheet: another mass stands in its place. Read the winding more often");
 }
 
+TEST(SlowReport, AMotorThatBeginsWarmIsNotInFahrenheit) {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    Hidden log = hidden({.core = tests::Core::none, .seed = seed, .effects = {"constant_heat"}});
+    for (auto& column : log.logs[0].columns) {
+      if (!column.empty()) column.erase(column.begin(), column.begin() + 4000);
+    }
+    std::vector<double>& t = log.logs[0].of(identify::Role::time);
+    for (double& x : t) x -= 400;
+    const std::string sentence = identify::discover(log.logs, log.log.sheet).sentence;
+    EXPECT_EQ(sentence.find("Fahrenheit"), std::string::npos) << seed << ": " << sentence;
+  }
+}
+
 TEST(SlowReport, TwoClocksTwoMinutesApartAreToldByHowMuch) {
   Hidden log = hidden({.seed = 1});
   auto& current = log.logs[0].of(identify::Role::current);
