@@ -145,6 +145,7 @@ std::string heat_set_toml(const Problem& problem, const Fit& f, const std::strin
     s += "# No motor file was given: the winding counts as 1 ohm. With its true g (3/4 of the resistance between two "
          "terminals, 3/2 of a phase's), multiply gains, conductances and capacities by g.\n";
   s += "format = 1\n";
+  if (problem.belief.known) s += fmt::format("motor = \"{}\"\n", problem.belief.motor);
   for (int i = 0; i < set.node_count; ++i) {
     s += fmt::format("\n[[node]]  # {}: {}\ncapacity_J_per_K = {:.6g}\n", i,
                      i == m.core             ? "winding"

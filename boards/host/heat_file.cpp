@@ -75,7 +75,7 @@ int each(const std::string& path, const toml::table& file, const char* name, int
 
 HeatModel read_heat_model(const std::string& path) {
   const toml::table file = wire::pc::parse_toml(wire::pc::find_toml("heat model", path, "."));
-  known_keys(path, file, {"format", "node", "link", "source", "housing_sensor", "trust", "recording"});
+  known_keys(path, file, {"format", "motor", "node", "link", "source", "housing_sensor", "trust", "recording"});
   if (file["format"].value_or(0) != 1) refuse(path + ": format must be 1; write the model again with this identify.");
 
   thermal::HeatSet<double> set{};
@@ -130,7 +130,7 @@ HeatModel read_heat_model(const std::string& path) {
   if (!heated)
     refuse(path + ": no current heats it, and a board measures no power; record the current and identify again.");
 
-  HeatModel model{set, {}};
+  HeatModel model{file["motor"].value_or(std::string()), set, {}};
   if (const toml::table* trust = file["trust"].as_table()) {
     const std::string place = path + ": trust";
     known_keys(place, *trust, {"power", "inner_resistance", "cooling", "correlation"});

@@ -11,6 +11,7 @@
 namespace boards::host {
 
 struct HeatModel {
+  std::string motor;  // whose it is, where the file says it
   thermal::HeatSet<double> set;
   std::optional<thermal::Trust> trust;  // how sure the fit was, where the file says it
 };

@@ -33,7 +33,17 @@ class Wish {
   Wish(const Scene& scene, Limiter limiter, const wire::pc::MotorFile& file)
       : scene_(scene), limiter_(limiter), motor_(file.motor) {}
 
+  /// What passes of the demand.
   double amperes(double demand_A, double estimated_core_degC, double true_core_degC, const hal::Temperature& housing) {
+    return passed_A_ = passed(demand_A, estimated_core_degC, true_core_degC, housing);
+  }
+  /// Of what the firmware allows, what is left behind this limiter.
+  double allowance_A(double of_the_firmware_A) const {
+    return limiter_ == Limiter::governor ? of_the_firmware_A : std::min(of_the_firmware_A, std::abs(passed_A_));
+  }
+
+ private:
+  double passed(double demand_A, double estimated_core_degC, double true_core_degC, const hal::Temperature& housing) {
     const double rated_A = motor_.rated_current_A / wire::direct_per_amplitude;
     switch (limiter_) {
       case Limiter::governor:
@@ -49,8 +59,6 @@ class Wish {
     }
     return 0;
   }
-
- private:
   bool cut(double degC, double limit_degC) {
     if (degC >= limit_degC) cut_ = true;
     if (degC < limit_degC - restart_K) cut_ = false;
@@ -61,6 +69,7 @@ class Wish {
   Limiter limiter_;
   const wire::Motor& motor_;
   bool cut_ = false;
+  double passed_A_ = 0;
 };
 
 /// Means over one log interval.
@@ -167,6 +176,11 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
     axis.heat = thermal::three_phase_set(known);
   } else {
     const HeatModel model = read_heat_model(scene.model);
+    if (!model.motor.empty() && model.motor != file.name)
+      wire::pc::refuse(
+          fmt::format("{}: it was identified on {}, and this scene's motor is {}; identify that one, or say "
+                      "--set motor=NAME.",
+                      scene.model, model.motor, file.name));
     axis.heat = thermal::split_phases(model.set, known.phase_coupling_W_per_K);
     of_the_model = model.trust.value_or(of_the_model);
   }
@@ -277,6 +291,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
       if (demand != 0) trace.impulse_As += std::hypot(truth.current_d_A, truth.current_q_A) * period_s;
       if ((periods_ - warm_up) % log_periods == 0) {
         Row line = row(trace.axis, time_s, demand);
+        if (demand != 0) line.allowance_A = wishes[i].allowance_A(line.allowance_A);
         sums[i].write(line, design_.sensors.current_noise_A);
         trace.rows.push_back(line);
       }
@@ -292,7 +307,8 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
 Result run_scene(const Scene& scene, const RunOptions& options) {
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, options.motor_folder);
   Result result = result_of(scene, file);
-  if (scene.shaft.kind != Shaft::Kind::locked && scene.program.empty()) {
+  // A motor that hides something is another one than the optimum's.
+  if (scene.shaft.kind != Shaft::Kind::locked && scene.program.empty() && !options.plant_motor) {
     const wire::Motor known =
         host_sim::true_sheet(file.motor, host_sim::heat_from_sheet(file.motor, heat_options(scene)));
     result.optimal_impulse_As = optimal_impulse_As(scene, known, static_cast<double>(rating_of(scene.board).peak_A));

@@ -15,7 +15,7 @@ namespace boards::host {
 struct Row {
   double time_s;
   double demand_A;            // amplitude asked for
-  double allowance_A;         // amplitude the firmware allowed
+  double allowance_A;         // amplitude that the limiter and the firmware allowed
   double id_now_A, iq_now_A;  // at the end of the interval
   double iq_A;                // rms of the current without its ripple, signed like its torque
   double current_A;  // direct current that heats like the interval's phase currents: sqrt(3/4 mean |i|^2) with the PWM

@@ -76,6 +76,14 @@ TEST(HeatFile, AnUncertainModelIsRunMoreCautiously) {
             std::string::npos);
 }
 
+TEST(HeatFile, AModelOfAnotherMotorIsRefused) {
+  const std::string scenes = HOTCORE_SOURCE_DIR "/host-sim/scenes",
+                    model = written("motor = \"other\"\n" + model_text());
+  EXPECT_THROW(boards::host::run_scene(boards::host::read_scene("get-up", scenes, {"seconds=1", "model=" + model}),
+                                       {.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors"}),
+               wire::pc::UserError);
+}
+
 TEST(HeatFile, SplitPhasesEquallyHeatedAreTheLumpedWinding) {
   const thermal::HeatSet<double> lumped = boards::host::read_heat_model(written(model_text())).set;
   const thermal::HeatSet<double> split = thermal::split_phases(lumped, 0);
