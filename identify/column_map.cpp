@@ -145,22 +145,46 @@ struct Likely {
   std::vector<const char*> words;
 };
 
-/// ROLE=COLUMN, as a command line takes it, of the first words that a column has which moves; without one with NAME.
-std::string likely_column(const Table& table, const std::vector<Likely>& likely) {
+/// Sinusoidal currents heat by 3/2 of their rms squared what current_A heats.
+constexpr const char* rms_unit = ":1.2247A";
+
+/// ROLE=COLUMN, as a command line takes it, of the first words that a column has which moves and is not `found`; empty:
+/// there is none.
+std::string likely_column(const Table& table, const std::map<Role, Source>& found, const std::vector<Likely>& likely) {
   for (const bool moves : {true, false}) {
     for (const auto& [role, words] : likely) {
       for (std::size_t c = 0; c < table.names.size(); ++c) {
         const std::string& name = table.names[c];
+        if (std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; })) continue;
         const std::vector<double>& cells = table.columns[c];
         const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
         const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
         if (!has || stands == moves) continue;
         const std::string quote = name.find_first_of(" ()[]'&;$*?") == std::string::npos ? "" : "\"";
-        return own_name(role) + "=" + quote + name + quote;
+        const std::string unit = role == Role::current && has_word(name, "rms") ? rms_unit
+                                 : role == Role::time && has_word(name, "ms")   ? ":ms"
+                                                                                : "";
+        return own_name(role) + "=" + quote + name + unit + quote;
       }
     }
   }
-  return own_name(likely.front().role) + "=NAME";
+  return "";
+}
+
+/// Columns that nothing needs, and that would tell more.
+void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
+  const struct {
+    Likely likely;
+    const char* what;
+  } useful[] = {{{Role::speed, {"velocity", "speed", "rpm", "erpm", "omega", "drehzahl"}}, "the motor's speed"},
+                {{Role::core, {"winding", "coil", "wicklung"}}, "the winding's temperature"},
+                {{Role::ambient, {"ambient", "room", "umgebung"}}, "the room's temperature"}};
+  for (const auto& [likely, what] : useful) {
+    const std::string column = found.contains(likely.role) ? "" : likely_column(table, found, {likely});
+    if (!column.empty())
+      notes.push_back(fmt::format("A column may be {} and is not used: if it is, say --column {}{}.", what, column,
+                                  likely.role == Role::speed ? " (and its unit, as :rpm)" : ""));
+  }
 }
 
 /// Databases and dashboards export one value a row, beside what it is of.
@@ -191,14 +215,17 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   const Need needs[] = {{{Role::time},
                          "a time column",
                          "call it time_s, say --column {}, or --period S where the rows are S seconds apart",
-                         {{Role::time, {"time", "zeit", "stamp", "date", "datum"}}}},
+                         {{Role::time, {"time", "zeit", "stamp", "ms"}}, {Role::time, {"date", "datum"}}}},
                         {{Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque},
                          "the heat input (current_A, iq_A, power_W or torque_Nm)",
                          "map it with --column {}",
-                         {{Role::current, {"motor current", "motor_current", "current_motor", "motorcurrent"}},
+                         {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
+                          {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
                           {Role::iq, {"iq", "q-axis", "q_axis"}},
                           {Role::current, {"current", "curr", "strom", "amp"}},
-                          {Role::torque, {"torque", "effort", "drehmoment"}}}},
+                          {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
+                          {Role::torque, {"torque", "effort", "drehmoment"}},
+                          {Role::power, {"loss", "p_loss", "verlust"}}}},
                         {{Role::housing, Role::core},
                          "a measured temperature (housing_degC or core_degC)",
                          "map it with --column {}",
@@ -210,7 +237,9 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
         std::any_of(need.any_of.begin(), need.any_of.end(), [&](Role r) { return found.contains(r); }))
       continue;
     missing_ones.emplace_back(need.what);
-    hints.push_back(fmt::format(fmt::runtime(need.hint), likely_column(table, need.likely)));
+    const std::string likely = likely_column(table, found, need.likely);
+    hints.push_back(
+        fmt::format(fmt::runtime(need.hint), likely.empty() ? own_name(need.likely.front().role) + "=NAME" : likely));
   }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);
@@ -306,9 +335,17 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
   const std::string time = called_time(table, found);
   if (!found.contains(Role::time) && std::isnan(map.period_s) && !time.empty()) {
     found[Role::time] = {time};
-    notes.push_back(fmt::format("Column '{}' is taken for the time, in seconds where no unit is said.", time));
+    notes.push_back(fmt::format("Column '{}' is taken for the time{}.", time,
+                                table.of_day[index_of(table, {time})] ? "" : ", in seconds where no unit is said"));
   }
   refuse_without_columns(table, found, !std::isnan(map.period_s));
+  note_unused_columns(table, found, notes);
+  if (const auto current = found.find(Role::current);
+      current != found.end() && has_word(current->second.column, "rms") && !current->second.unit_said)
+    notes.push_back(
+        fmt::format("The rms of a sinusoidal current heats as 1.2247 times as much direct current: if '{0}' is one of "
+                    "a phase, say --column current_A={0}{1}.",
+                    current->second.column, rms_unit));
   std::vector<std::string> by_row, by_name;
   for (auto& [role, source] : found) {
     for (const auto& [other, same] : found) {

@@ -131,7 +131,7 @@ bool digits(std::string_view s, int& value) {
 
 /// 08:15:30.5 as seconds, or what a stopwatch shows, 1:05.3 or 2:01:05 (with a fraction where there are no hours: 12:30
 /// may be a time of day).
-bool time_of_day(std::string_view s, double& value) {
+bool on_a_clock(std::string_view s, double& value) {
   int first = 0, minute = 0;
   const std::size_t colon = s.find(':'), last = s.rfind(':');
   if (colon == std::string_view::npos || colon > 2 || !digits(s.substr(0, colon), first)) return false;
@@ -142,6 +142,27 @@ bool time_of_day(std::string_view s, double& value) {
   const auto [end, error] = std::from_chars(seconds.data(), seconds.data() + seconds.size(), second);
   if (error != std::errc() || end != seconds.data() + seconds.size() || !(second >= 0 && second < 61)) return false;
   value = (colon == last ? 60 * first : 3600 * first + 60 * minute) + second;
+  return true;
+}
+
+/// Takes " AM" or " PM" off: 'a', 'p', or 0 where neither stands there.
+char take_half_of_day(std::string_view& s) {
+  const std::string half = s.size() < 3 ? "" : in_small(s.substr(s.size() - 3));
+  if (half != " am" && half != " pm") return 0;
+  s.remove_suffix(3);
+  return half[1];
+}
+
+/// Of a clock of twelve hours, where a half of the day is said.
+double since_midnight_s(double on_a_clock_s, char half) {
+  if (half == 0) return on_a_clock_s;
+  return on_a_clock_s + 3600 * ((half == 'p' ? 12 : 0) - (on_a_clock_s >= 12 * 3600 ? 12 : 0));
+}
+
+bool time_of_day(std::string_view s, double& value) {
+  const char half = take_half_of_day(s);
+  if (!on_a_clock(s, value)) return false;
+  value = since_midnight_s(value, half);
   return true;
 }
 
@@ -194,12 +215,10 @@ bool moment(std::string_view s, double& value) {
     return true;
   }
   double ahead_s = 0;
-  const std::string half = clock.size() < 3 ? "" : in_small(clock.substr(clock.size() - 3));
-  const bool american = half == " am" || half == " pm";
-  if (american) clock.remove_suffix(3);
+  const char half = take_half_of_day(clock);
   if (clock.ends_with(" UTC") || clock.ends_with(" GMT")) clock.remove_suffix(4);
   std::chrono::year_month_day date;
-  if (clock.empty() || !date_of(s.substr(0, begin), american, date)) return false;
+  if (clock.empty() || !date_of(s.substr(0, begin), half != 0, date)) return false;
   if (clock.back() == 'Z') {
     clock.remove_suffix(1);
   } else if (const std::size_t sign = clock.find_first_of("+-"); sign != std::string_view::npos) {
@@ -212,8 +231,8 @@ bool moment(std::string_view s, double& value) {
   }
   std::string told(trimmed(clock));
   if (std::count(told.begin(), told.end(), ':') == 1) told += ":00";  // beside a date it is no stopwatch
-  if (!time_of_day(told, value)) return false;
-  if (american) value += 3600 * ((half == " pm" ? 12 : 0) - (value >= 12 * 3600 ? 12 : 0));
+  if (!on_a_clock(told, value)) return false;
+  value = since_midnight_s(value, half);
   value += 86400.0 * static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) - ahead_s;
   return true;
 }

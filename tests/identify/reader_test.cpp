@@ -328,10 +328,11 @@ TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
       "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
       "--period S does without); repair it";
   for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "12/31/2025 10:00:00",
-                           "10:00:00 AM", "8:15 PM", "2025-06-01", "Dec 31 10:00:00 2025"})
+                           "13.5:00 AM", "8:15 PM", "2025-06-01", "Dec 31 10:00:00 2025"})
     says(complaint(head + date + ",1,20\n"), forms);
-  for (const char* time : {"12.5", "08:15:30", "1:05.3", "2026-11-21 08:15:30", "2026-11-21T08:15:30.5+01:00",
-                           "21.11.2026 08:15:30", "21-Nov-2026 08:15:30", "11/21/2026 08:15:30 AM"})
+  for (const char* time :
+       {"12.5", "08:15:30", "1:05.3", "08:15:30 AM", "2026-11-21 08:15:30", "2026-11-21T08:15:30.5+01:00",
+        "21.11.2026 08:15:30", "21-Nov-2026 08:15:30", "11/21/2026 08:15:30 AM"})
     EXPECT_EQ(read(head + time + ",1,20\n")[0].of(Role::time).size(), 1u) << time;
   says(complaint(head + "1.5x,1,20\n"), "'1.5x' in column 'time_s' is not a number; repair it");
 }
@@ -563,6 +564,8 @@ TEST(Reader, DatesAreReadInEachFormThatCannotBeAnother) {
       {"2026-11-21 08:15", "2026-11-22 08:15"},           {"0 days 00:00:01", "1 days 00:00:01"}};
   for (const auto& [one, other] : pairs)
     EXPECT_DOUBLE_EQ(read(head + one + ",1,20\n" + other + ",1,21\n")[0].of(Role::time)[1], 86400) << one;
+  EXPECT_DOUBLE_EQ(read(head + "11:59:30 AM,1,20\n12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
+  EXPECT_DOUBLE_EQ(read(head + "11:59:30 PM,1,20\n12:00:30 AM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11/20/2026 11:59:30 AM,1,20\n11/20/2026 12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
   for (const char* either :
        {"11/20/2026 08:15:30", "21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
@@ -642,6 +645,18 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
   const std::string dyno = complaint("Input current,Motor q-axis current,FET temp\n0,1,20\n0,2,21\n");
   says(dyno, "--column iq_A=\"Motor q-axis current\"");  // the supply's never moves
   says(complaint("I_bus,t\n1,0\n2,1\n"), "--column current_A=NAME");
+  const std::string vesc = complaint("ms_today,temp_motor,current_motor,erpm\n0,20,1,1\n1,21,2,2\n");
+  for (const char* column : {"time_s=ms_today:ms", "iq_A=current_motor"}) says(vesc, column);
+  says(complaint("time_s,i_a,i_b,temp\n0,1,1,20\n1,2,2,21\n"), "--column phase_a_A=i_a");
+  says(complaint("time,motor_rms_current,temp\n0,1,20\n1,2,21\n"), "--column current_A=motor_rms_current:1.2247A");
+  says(complaint("Date,Time,P_loss,temp\n1/2/2026,1:00 PM,1,20\n"), "--column power_W=P_loss");
+}
+
+TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
+  const std::string rows = "time_s,current_A,housing_degC,velocity,T_winding,motor\n0,1,20,0,20,1\n1,2,21,9,30,1\n";
+  const std::string notes = fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
+  says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm)");
+  says(notes, "say --column core_degC=T_winding.");
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
