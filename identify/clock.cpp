@@ -19,9 +19,8 @@ using wire::pc::refuse_data;
 void check_epoch(const Log& log, double first_cell) {
   if (log.of(Role::time).front() < 1e11) return;
   const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
-  refuse_data(
-      fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say --column time_s=COLUMN:{}.",
-                  log.name, first_cell, unit, unit));
+  refuse_data(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say {}.", log.name, first_cell,
+                          unit, column_in(log, Role::time, unit)));
 }
 
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {

@@ -160,11 +160,10 @@ std::string likely_column(const Table& table, const std::map<Role, Source>& foun
         const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
         const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
         if (!has || stands == moves) continue;
-        const std::string quote = name.find_first_of(" ()[]'&;$*?") == std::string::npos ? "" : "\"";
         const std::string unit = role == Role::current && has_word(name, "rms") ? rms_unit
                                  : role == Role::time && has_word(name, "ms")   ? ":ms"
                                                                                 : "";
-        return own_name(role) + "=" + quote + name + unit + quote;
+        return own_name(role) + "=" + for_a_shell(name + unit);
       }
     }
   }
@@ -256,6 +255,10 @@ std::size_t index_of(const Table& table, const Source& source) {
 
 std::string roles_and_units() {
   return fmt::format("roles: {}\nunits: {}", fmt::join(own_names(), ", "), fmt::join(unit_names(), ", "));
+}
+
+std::string for_a_shell(const std::string& word) {
+  return word.find_first_of(" ()[]'&;$*?") == std::string::npos ? word : "\"" + word + "\"";
 }
 
 const std::string& own_name(Role role) { return own_names()[static_cast<std::size_t>(role)]; }

@@ -51,6 +51,9 @@ std::string roles_and_units();
 /// The name under which a role is recognised without a map, unit included ("housing_degC").
 const std::string& own_name(Role role);
 
+/// In quotation marks where a shell would take it apart.
+std::string for_a_shell(const std::string& word);
+
 struct Source {
   std::string column;
   double factor = 1, offset = 0;  // SI = factor * (cell + offset)

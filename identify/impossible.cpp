@@ -79,19 +79,19 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
     // Nothing that a person works beside is always hotter than 200 degC; 200 K is -73 degC.
     if (low > 450)
       refuse_data(
-          fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say --column "
-                      "{}=COLUMN:0.01degC (or what one is worth).",
-                      log.name, own_name(role), low, own_name(role)));
+          fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say {} (or "
+                      "what one is worth).",
+                      log.name, own_name(role), low, column_in(log, role, "0.01degC")));
     if (low > 200)
-      refuse_data(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say --column {}=COLUMN:K.",
-                              log.name, own_name(role), low, own_name(role)));
+      refuse_data(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say {}.", log.name,
+                              own_name(role), low, column_in(log, role, "K")));
     // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
     // not.
     if (role == Role::ambient && low > 55)
       refuse_data(
-          fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say --column "
-                      "ambient_degC=COLUMN:degF (and the same for the other temperatures).",
-                      log.name, low));
+          fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say {} (and the same "
+                      "for the other temperatures).",
+                      log.name, low, column_in(log, role, "degF")));
     check_range(log, role, -80, 600, "degC");
   }
   // Without anything that says how warm it is around the motor, a motor that is never cooler than a room can be is no
@@ -99,17 +99,17 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
   const Role motor_at = log.has(Role::housing) ? Role::housing : Role::core;
   if (!log.has(sink_of(log)) && lowest(log.of(motor_at)) > 55)
     refuse_data(
-        fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: if this is Fahrenheit "
-                    "say --column {1}=COLUMN:degF, otherwise record the ambient too.",
-                    log.name, own_name(motor_at), lowest(log.of(motor_at))));
+        fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: say how warm the room was, "
+                    "--ambient DEGC, or record it; if this is Fahrenheit say {3}.",
+                    log.name, own_name(motor_at), lowest(log.of(motor_at)), column_in(log, motor_at, "degF")));
   const double most_A = most_current_A(motor);
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A)
       refuse_data(
-          fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say --column "
-                      "{1}=COLUMN:mA, if it is another quantity map the right column.",
-                      log.name, own_name(role), peak, most_A));
+          fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say "
+                      "{4}, if it is another quantity map the right column.",
+                      log.name, own_name(role), peak, most_A, column_in(log, role, "mA")));
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");
 }

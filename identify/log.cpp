@@ -69,6 +69,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     log.notes.push_back(fmt::format("Rows that are the same as the row before were left out: {}.", repeated));
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
+    log.called[static_cast<std::size_t>(role)] = source.column;
     const auto& from = table.columns[index_of(table, source)];
     auto& to = log.of(role);
     to.reserve(rows.size());
@@ -104,6 +105,12 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
 }
 
 }  // namespace
+
+std::string column_in(const Log& log, Role role, const std::string& unit) {
+  const std::string& called = log.called[static_cast<std::size_t>(role)];
+  return fmt::format("--column {}={}", own_name(role),
+                     for_a_shell((called.empty() ? own_name(role) : called) + ":" + unit));
+}
 
 bool resumes(const Log& log, double after_s, double until_s) {
   return std::any_of(log.resumes_s.begin(), log.resumes_s.end(), [&](double s) { return s > after_s && s <= until_s; });

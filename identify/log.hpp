@@ -32,7 +32,8 @@ struct Reference {
 struct Log {
   std::string name;
   std::array<std::vector<double>, role_count> columns;
-  std::vector<std::string> notes;  // what was repaired, masked or assumed, one sentence each
+  std::array<std::string, role_count> called;  // what the file calls them; empty for what was derived
+  std::vector<std::string> notes;              // what was repaired, masked or assumed, one sentence each
   double missing_share = 0;  // of housing (else core) readings, of input cells or of whole rows: the worst of these
   double gap_share = 0;      // of the duration, what lies in gaps
   std::vector<double> resumes_s;  // where it goes on after a pause in which nothing tells the heat (pauses.hpp)
@@ -54,6 +55,9 @@ inline constexpr double idle_heat_share = 1e-3, idle_speed_share = 0.02;
 
 /// Does it go on, after a pause, between these times?
 bool resumes(const Log& log, double after_s, double until_s);
+
+/// How a column is read in another unit, as a command line takes it: --column housing_degC=T_case:degF.
+std::string column_in(const Log& log, Role role, const std::string& unit);
 
 /// What tells the heat: a power, else a current; iq of currents along two axes.
 Role heat_of(const Log& log);

@@ -21,9 +21,12 @@ namespace {
 
 using thermal::Drive;
 
-constexpr const char* in_milliseconds =
-    "Read in milliseconds, or less, the time column makes a motor that follows the load, and in seconds none; say "
-    "--column time_s=COLUMN:ms, or :us.";
+std::string in_milliseconds(const Log& log) {
+  return fmt::format(
+      "Read in milliseconds, or less, the time column makes a motor that follows the load, and in seconds none; say "
+      "{}, or :us.",
+      column_in(log, Role::time, "ms"));
+}
 
 /// What follows the load where it is read otherwise leaves clearly less than the best as it stands, a likelihood e^20
 /// times as great where a mistaken unit makes it e^100 and more, and a fraction of what two resistors leave.
@@ -67,7 +70,8 @@ std::string unlike_the_motor(const Problem& problem, const Found& found, const s
     if (in_air && settles_s < 20 && determines_housing(problem, *f))
       return fmt::format(
           "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
-          "--column time_s=COLUMN:min{}.",
+          "{}{}.",
+          column_in(logs.front(), Role::time, "min"),
           problem.logs.front().sink_assumed ? ", and if the log begins warm say how warm the room is, --ambient DEGC"
                                             : "");
   }
@@ -175,7 +179,7 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
   };
   if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K) &&
       follows_better(read_in(*unit_named("ms"), {Role::time}, logs), by_one))
-    return in_milliseconds;
+    return in_milliseconds(logs.front());
   // A column that is ever below 50 would be below 10 degC: no room where motors are measured. Nor is what heats colder
   // than what cools it: a log that begins warm would be.
   const Unit& degF = *unit_named("degF");
@@ -194,7 +198,7 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
         !follows_better(read_in(degF, roles, logs), explained))
       continue;
     std::string columns;
-    for (const Role role : roles) columns += fmt::format(" --column {}=COLUMN:degF", own_name(role));
+    for (const Role role : roles) columns += " " + column_in(logs.front(), role, "degF");
     return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
                        columns);
   }
@@ -434,7 +438,7 @@ std::string too_short(const Problem& problem, const Found& found) {
 std::string suspicion(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor) {
   for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
-    if (far_too_slow(problem, *f)) return in_milliseconds;
+    if (far_too_slow(problem, *f)) return in_milliseconds(logs.front());
   }
   if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.

@@ -120,7 +120,7 @@ TEST(SlowBadInput, TimeInMilliseconds) {
   const auto in_ms = [](auto& row, int number) { return row[0] = std::to_string(number * 100), true; };
   refused(spoilt(in_ms), "check the units of current and time");
   const Outcome without_sheet = run(spoilt(in_ms));
-  says(without_sheet.out, "--column time_s=COLUMN:ms");
+  says(without_sheet.out, "--column time_s=time_s:ms");
 }
 
 TEST(SlowBadInput, TimeInMillisecondsOfAMotorThatHasACause) {
@@ -129,14 +129,14 @@ TEST(SlowBadInput, TimeInMillisecondsOfAMotorThatHasACause) {
   const Outcome r =
       run(spoilt([](auto& row, int number) { return row[0] = std::to_string(number * 100), true; }, options));
   says(r.out, "Verdict: insufficient");
-  says(r.out, "--column time_s=COLUMN:ms");
+  says(r.out, "--column time_s=time_s:ms");
 }
 
 TEST(SlowBadInput, TimeInMinutes) {
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
   const Outcome r = run(spoilt(in_min) + " --explain");
   says(r.out, "Verdict: insufficient");
-  says(r.out, "--column time_s=COLUMN:min");
+  says(r.out, "--column time_s=time_s:min");
   says(r.out, "The two-resistor model was fitted; what it leaves is");
 }
 
@@ -247,10 +247,11 @@ std::string fahrenheit(const std::string& degC) {
 
 TEST(SlowBadInput, OneTemperatureInFahrenheitBesideOthersInCelsius) {
   refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), true; }),
-          "--column housing_degC=COLUMN:degF");
-  refused(spoilt([](auto& row, int) { return row[5] = fahrenheit(row[5]), true; }), "--column core_degC=COLUMN:degF");
+          "--column housing_degC=housing_degC:degF");
+  refused(spoilt([](auto& row, int) { return row[5] = fahrenheit(row[5]), true; }),
+          "--column core_degC=core_degC:degF");
   refused(spoilt([](auto& row, int) { return row[3] = fahrenheit(row[3]), row[5] = fahrenheit(row[5]), true; }),
-          "--column housing_degC=COLUMN:degF --column core_degC=COLUMN:degF");
+          "--column housing_degC=housing_degC:degF --column core_degC=core_degC:degF");
 }
 
 TEST(SlowBadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
@@ -263,7 +264,7 @@ TEST(SlowBadInput, AWindingInFahrenheitBesideAnEffectOfItsOwn) {
             row[5] = fahrenheit(row[5]);
             return true;
           }),
-          "--column core_degC=COLUMN:degF");
+          "--column core_degC=core_degC:degF");
 }
 
 TEST(SlowBadInput, CurrentAndSpeedSwapped) {

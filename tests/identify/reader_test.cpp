@@ -343,14 +343,14 @@ TEST(Reader, ACountSince1970InNoSecondsIsRefusedWithItsUnit) {
   };
   EXPECT_NEAR(read(rows(""))[0].of(Role::time)[1], 2, 1e-6);
   for (const auto& [zeros, unit] : {std::pair("000", "ms"), std::pair("000000", "us"), std::pair("000000000", "ns")}) {
-    says(complaint(rows(zeros)), std::string("looks like ") + unit + " since 1970; say --column time_s=COLUMN:" + unit);
+    says(complaint(rows(zeros)), std::string("looks like ") + unit + " since 1970; say --column time_s=time_s:" + unit);
     ColumnMap map;
     add_column(map, std::string("time_s=time_s:") + unit);
     EXPECT_NEAR(read(rows(zeros), map)[0].of(Role::time)[1], 2, 1e-6);
   }
   ColumnMap still_too_coarse;
   add_column(still_too_coarse, "time_s=time_s:ms");
-  says(complaint(rows("000000000"), still_too_coarse), "time_s=COLUMN:ns");
+  says(complaint(rows("000000000"), still_too_coarse), "time_s=time_s:ns");
 }
 
 TEST(Reader, AClockThatPassesMidnightGoesOn) {
@@ -603,7 +603,7 @@ TEST(Reader, AColumnMayBeInPartsOfAUnit) {
   EXPECT_NEAR(log.of(Role::ambient)[0], 20, 1e-9);
   EXPECT_NEAR(log.of(Role::ambient)[1], 20.5, 1e-9);
   says(complaint(head + "0,1,2150\n1,1,2250\n"),
-       "looks like parts of a degree; say --column housing_degC=COLUMN:0.01degC");
+       "looks like parts of a degree; say --column housing_degC=housing_degC:0.01degC");
 }
 
 TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
@@ -812,7 +812,8 @@ TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
   says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,70,70\n1,1,71,70\n"), "looks like Fahrenheit");
 }
 TEST(Reader, AMotorWarmerThanAnyRoomWithoutAnAmbientIsRefusedWithTheUnitItMayBe) {
-  says(complaint(head + "0,1,70\n1,1,71\n"), "if this is Fahrenheit say --column housing_degC=COLUMN:degF");
+  says(complaint(head + "0,1,70\n1,1,71\n"),
+       "--ambient DEGC, or record it; if this is Fahrenheit say --column housing_degC=housing_degC:degF");
 }
 TEST(Reader, HousingAndWindingSwappedAreRecognised) {
   // A winding (2 s) on a housing (300 s), half a minute of load and rest by turns.
