@@ -182,6 +182,8 @@ void judge_baseline(const Problem& problem, const Fit& f, double judged_ratio, c
   report.baseline = base_lines(problem, f, inflation);
   report.core_refusal = core_refusal(problem, f);
   const auto loose = directions(f);
+  const bool bounded =
+      std::any_of(report.baseline.begin(), report.baseline.end(), [](const auto& l) { return l.at_bound; });
   bool identifiable = true;
   for (const Loose& direction : loose) {
     if (direction.sd * inflation < determined_sd) continue;
@@ -196,15 +198,16 @@ void judge_baseline(const Problem& problem, const Fit& f, double judged_ratio, c
   const auto right = [](double ratio) { return ratio < noise_alone; };
   report.needs_leeway = !right(left) && judged_ratio > 0 && right(judged_ratio);
   const bool residual = right(left) || report.needs_leeway;
-  report.converged = f.settled && residual && identifiable;
+  report.converged = f.settled && residual && identifiable && !bounded;
   report.checks = {fmt::format("gradient: {} after {} iterations", f.settled ? "at rest" : "NOT at rest", f.iterations),
                    fmt::format("residual: {:.2f} times the noise{}", left,
                                report.needs_leeway ? fmt::format(", {:.2f} beside {}", judged_ratio, leeway_words)
                                : residual          ? ""
                                                    : ", so the model is not right yet"),
-                   identifiable ? "identifiability: all four parameters are determined by this data"
-                                : fmt::format("identifiability: {} of 4 directions are not determined by this data",
-                                              report.loose.size())};
+                   identifiable && bounded ? "identifiability: a parameter stands at its bound; this is another motor"
+                   : identifiable          ? "identifiability: all four parameters are determined by this data"
+                                  : fmt::format("identifiability: {} of 4 directions are not determined by this data",
+                                                report.loose.size())};
 
   // Is copper's coefficient a gain at all? Where it is not, two errors cancel, and neither is small.
   if (!problem.heated_by_power() && problem.belief.copper_per_K > 0) {

@@ -11,6 +11,7 @@
 #include "identify/gain.hpp"
 #include "identify/held_out.hpp"
 #include "identify/leeway.hpp"
+#include "identify/masks.hpp"
 #include "identify/model_file.hpp"
 #include "identify/refusals.hpp"
 #include "identify/search.hpp"
@@ -202,17 +203,24 @@ void note_still_ambient(const std::vector<Log>& logs, Report& report) {
         "change of cooling.");
 }
 
-/// What a loop controls and what is sampled with the pulses is the mean between them.
-void note_unseen_ripple(const std::vector<Log>& logs, Report& report) {
-  for (const Log& log : logs) {
-    const bool phases = log.has(Role::phase_a);
-    if (heat_of(log) != Role::iq && !phases) continue;
+/// What the columns of the heat may leave out: pulses between the samples of a loop, all that is less than a step, or
+/// what a supply's power is more than heat.
+void note_what_heat_leaves_out(const std::vector<Log>& logs, Report& report) {
+  const Log& log = logs.front();
+  const Role heat = heat_of(log);
+  const bool phases = log.has(Role::phase_a);
+  if (heat == Role::iq || phases)
     report.notes.push_back(fmt::format(
-        "{} {} not tell the ripple of the pulses, which heats as well and grows with voltage and speed; of a motor of "
+        "{} not tell the ripple of the pulses, which heats as well and grows with voltage and speed; of a motor of "
         "small inductance it may be all that is missing. Record an rms current beside it (current_A).",
-        phases ? "Currents sampled in the phases" : "iq_A", phases ? "may" : "does"));
-    return;
-  }
+        phases ? "Currents sampled in the phases may" : "iq_A does"));
+  if (heat == Role::power)
+    report.notes.push_back("power_W must be what heats the winding; a supply's power is what the shaft does as well.");
+  constexpr double coarse = 0.02;  // of the most: a tenth of it is then off by up to a fifth in its square
+  const double step = step_of(log.of(heat));
+  if (step > coarse * largest_magnitude(log.of(heat)))
+    report.notes.push_back(fmt::format(
+        "{} moves in steps of {:g}; what flows below is lost, and heats. Record it finer.", own_name(heat), step));
 }
 
 /// The most current an experiment may ask for, amplitude: what the logs show the motor and its drive to bear, or three
@@ -495,7 +503,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     tell(problem, found, report);
     if (found.verdict != Verdict::adequate) {
       note_still_ambient(logs, report);
-      note_unseen_ripple(logs, report);
+      note_what_heat_leaves_out(logs, report);
     }
     const std::string untried = not_tried(problem, logs);
     if (!untried.empty())

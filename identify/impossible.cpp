@@ -53,6 +53,32 @@ bool called_like_a_phase(const std::string& column) {
   return name.size() == 2 && name[0] == 'i' && std::string_view("abcuvw").find(name[1]) != std::string_view::npos;
 }
 
+/// What loggers write for want of a reading, and a DS18B20 as it wakes (85) or its library when it is silent (-127).
+/// Where a temperature leaps to it and back as none does, and too often to be glitches (masks.cpp).
+void forget_placeholders(Log& log, Role role) {
+  constexpr double leap_K = 10, few = 0.05;
+  std::vector<double>& v = log.of(role);
+  for (const double placeholder : {-1.0, 0.0, 85.0, -127.0}) {
+    std::size_t leaps = 0, rows = 0;
+    double last = missing, shortest_K = leap_K;
+    for (const double x : v) {
+      if (std::isnan(x)) continue;
+      rows += x == placeholder;
+      if (!std::isnan(last) && (x == placeholder) != (last == placeholder)) {
+        ++leaps;
+        shortest_K = std::min(shortest_K, std::abs(x - last));
+      }
+      last = x;
+    }
+    const bool often = static_cast<double>(rows) > few * static_cast<double>(count_told(v));
+    if (!often || leaps < 2 || shortest_K < leap_K) continue;
+    log.notes.push_back(
+        fmt::format("{} leaps to {:g} and back; that stands for no reading, and is left out in {} rows.",
+                    own_name(role), placeholder, rows));
+    std::replace(v.begin(), v.end(), placeholder, missing);
+  }
+}
+
 }  // namespace
 
 double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 40 * motor->rated_current_A : 1000; }
@@ -60,6 +86,7 @@ double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 
 void forget_impossible(Log& log) {
   constexpr double zero_K_degC = -273.15, few = 0.05;  // of the readings: more are another unit
   for (const Role role : temperatures) {
+    forget_placeholders(log, role);
     const auto impossible =
         std::count_if(log.of(role).begin(), log.of(role).end(), [](double x) { return x < zero_K_degC; });
     if (impossible == 0 || static_cast<double>(impossible) > few * static_cast<double>(count_told(log.of(role))))

@@ -395,6 +395,8 @@ std::string too_poor(const Problem& problem) {
       return fmt::format("{}: {:.0f} readings of a temperature are too few, {:.0f} the least; read it more often.",
                          log.name, static_cast<double>(std::max(housing, core)), static_cast<double>(least));
   }
+  if (span == 0)
+    return "The temperature is the same in all rows, as of a sensor that does not work; see whether it is connected.";
   if (span < least_span_K)
     return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
   return "";

@@ -1178,6 +1178,14 @@ TEST(Masks, ReadingsThatJumpAwayAndBackAreGlitches) {
     says(log.notes.front(), "6 readings masked, the first at 0.0 s");
   }
 }
+TEST(Masks, WhatALoggerWritesForWantOfAReadingIsNone) {
+  const Log log = read(recording(200, [&](int i, double&, double& housing_degC) {
+    if (i % 10 != 0) housing_degC = -1;
+    return true;
+  }))[0];
+  EXPECT_EQ(identify::count_told(log.of(Role::housing)), 20u);
+  says(fmt::format("{}", fmt::join(log.notes, " ")), "housing_degC leaps to -1 and back; that stands for no reading");
+}
 TEST(Masks, AWindingThatIsHotForSecondsIsNoGlitchAndOneColderThanItsRoomIs) {
   std::string text = "time_s,current_A,core_degC,ambient_degC\n";
   for (int i = 0; i < 60; ++i)
