@@ -221,16 +221,24 @@ void judge_baseline(const Problem& problem, const Fit& f, double judged_ratio, c
   add_plots(problem, f, "", report);
 }
 
-void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, Report& report) {
+void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, bool extended,
+                        Report& report) {
   constexpr double much = 4;  // shipped motors had 1.8 times their sheet's R1; R2 and C2 are the mount's as well
-  const auto compare = [&](const ParameterLine& line, double sheet) {
-    if (problem.belief.known && line.determined && !line.at_bound &&
-        std::abs(std::log(line.value / sheet)) > std::log(much))
+  const auto far = [&](const ParameterLine& line, double sheet) {
+    return problem.belief.known && line.determined && std::abs(std::log(line.value / sheet)) > std::log(much);
+  };
+  const std::pair<std::size_t, double> compared[] = {{0, problem.belief.R1_K_per_W}, {2, problem.belief.C1_J_per_K}};
+  for (const auto& [i, sheet] : compared) {
+    const ParameterLine &line = lines[i], &bent = report.baseline[i];
+    if (far(line, sheet) && !line.at_bound)
       report.notes.push_back(fmt::format("{} comes out {:.2g} times the sheet's; see whether {} is this motor.",
                                          line.name, line.value / sheet, problem.belief.motor));
-  };
-  compare(lines[0], problem.belief.R1_K_per_W);
-  compare(lines[2], problem.belief.C1_J_per_K);
+    else if (extended && far(bent, sheet))
+      report.notes.push_back(
+          fmt::format("Two resistors alone take {} for {:.2g} times the sheet's: they are bent by what "
+                      "is missing, and no motor to compare a board's gain with.",
+                      bent.name, bent.value / sheet));
+  }
 }
 
 }  // namespace identify

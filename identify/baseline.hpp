@@ -36,8 +36,8 @@ std::string stated_unit(const Problem& problem, const char* unit, Scale scale);
 std::vector<ParameterLine> base_lines(const Problem& problem, const Fit& fit, double inflation);
 
 /// Notes an R1 or a C1 far off the sheet. Two resistors that miss much may exchange their masses: `lines` are of the
-/// model found where one explains.
-void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, Report& report);
+/// model found where one explains (`extended`), and theirs are then said beside it.
+void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>& lines, bool extended, Report& report);
 
 /// Why no winding temperature may be stated, empty when it may.
 std::string core_refusal(const Problem& problem, const Fit& fit);

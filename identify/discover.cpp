@@ -519,7 +519,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     if (report.core_refusal.empty()) report.gain = gain_of(problem, baseline, offer.fit);
     if (report.gain) report.gain->like = listed(names_of(offer.fit.chosen), " and ");
   }
-  compare_with_sheet(problem, extended ? report.extended : report.baseline, report);
+  compare_with_sheet(problem, extended ? report.extended : report.baseline, extended, report);
   if (poor.empty()) {
     doing("looking for an experiment");
     report.experiment = experiment(problem, found, most_A(problem, motor));

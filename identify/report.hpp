@@ -86,6 +86,7 @@ inline constexpr const char* gauge_words =
 std::string cause_heading(Verdict verdict);                // "Behaves like"
 std::string nearest_words(const HeldOutScore& held_out);   // which has a nearest set
 std::string interval_words(const HeldOutScore& held_out);  // which has intervals
+const char* where_title(Verdict verdict);
 std::string whiteness_words(const Whiteness& of_residual);
 
 struct GainLine {

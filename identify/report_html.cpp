@@ -186,7 +186,8 @@ std::string worth(const Report& r) {
 }
 
 std::string where(const Report& r) {
-  std::string s = "<h2>Where it is wrong</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
+  std::string s =
+      std::string("<h2>") + where_title(r.verdict) + "</h2><table>" + row({"when", "what", "by", "goes with"}, "th");
   for (const Wrong& w : r.structure.wrong) {
     s += row({(r.plots.size() > 1 ? escaped(r.plots[w.log].name) + ", " : "") +
                   fmt::format("{:.0f}–{:.0f} s", w.from_s, w.to_s),

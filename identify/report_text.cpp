@@ -50,7 +50,7 @@ std::string variants(const Report& r) {
 }
 
 std::string where(const Report& r) {
-  std::string s = "\nWhere it is wrong\n  " + whiteness_words(r.structure.residual) + "\n";
+  std::string s = std::string("\n") + where_title(r.verdict) + "\n  " + whiteness_words(r.structure.residual) + "\n";
   if (r.structure.wrong.empty()) s += "  no stretch stands out\n";
   for (const Wrong& w : r.structure.wrong) {
     s += fmt::format("  {}{:.0f}..{:.0f} s: {} is {:.2f} K {} than simulated; goes with {}\n",
@@ -143,12 +143,17 @@ std::string interval_words(const HeldOutScore& h) {
       h.after_95->high);
 }
 
+const char* where_title(Verdict verdict) {
+  return verdict == Verdict::adequate ? "Where it misses most, no more than chance does" : "Where it is wrong";
+}
+
 std::string whiteness_words(const Whiteness& w) {
+  const auto chance = [](double p) { return p < 1e-300 ? std::string("less than 1e-300") : fmt::format("{:.2g}", p); };
   if (w.ratio == 0) return "too few readings to tell whether the residual is noise";
   return fmt::format(
-      "the residual is {:.2f} times the noise; a right model leaves one so unlike white noise with a chance of {:.2g} "
-      "(cumulated periodogram) or {:.2g} (Ljung-Box)",
-      w.ratio, w.white_p, w.ljung_box_p);
+      "the residual is {:.2f} times the noise; a right model leaves one so unlike white noise with a chance of {} "
+      "(cumulated periodogram) or {} (Ljung-Box)",
+      w.ratio, chance(w.white_p), chance(w.ljung_box_p));
 }
 
 std::string gain_conditions(const Gain& g) {
