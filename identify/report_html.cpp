@@ -49,19 +49,19 @@ std::string picture(const Report& r, std::size_t l) {
   const std::string before = extended ? ", two resistors" : "", of_two = extended ? before : " simulated";
   if (winding) {
     temperatures.curves.push_back({"winding measured", p.time_s, p.measured_core, "#d55e00", false, sparse});
-    residual.curves.push_back({"winding" + before, p.time_s, p.residual_core, "#d55e00", extended, sparse});
+    residual.curves.push_back({"winding" + before, p.time_s, p.residual_core, "#e69f00", extended, sparse});
   }
   if (winding || r.core_refusal.empty())
     temperatures.curves.push_back({"winding" + of_two, p.time_s, p.simulated_core, "#e69f00", true});
   if (housing) {
     temperatures.curves.push_back({"housing measured", p.time_s, p.measured_housing, "#0072b2"});
-    residual.curves.push_back({"housing" + before, p.time_s, p.residual_housing, "#0072b2", extended});
+    residual.curves.push_back({"housing" + before, p.time_s, p.residual_housing, "#56b4e9", extended});
   }
   temperatures.curves.push_back({"housing" + of_two, p.time_s, p.simulated_housing, "#56b4e9", true});
   if (extended) {
     if (winding || r.core_refusal.empty())
       temperatures.curves.push_back({"winding, extended", p.time_s, p.extended_core, "#009e73"});
-    temperatures.curves.push_back({"housing, extended", p.time_s, p.extended_housing, "#404040"});
+    temperatures.curves.push_back({"housing, extended", p.time_s, p.extended_housing, "#404040", true});
     const auto left = [](std::vector<double> measured, const std::vector<double>& simulated) {
       for (std::size_t k = 0; k < measured.size(); ++k) measured[k] -= simulated[k];
       return measured;
@@ -83,7 +83,9 @@ std::string picture(const Report& r, std::size_t l) {
         {w.from_s, w.to_s, wide ? fmt::format("{:+.1f} K", w.mean_K) : "", w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
     temperatures.stretches.push_back({w.from_s, w.to_s, "", w.mean_K > 0 ? "#f4d9d0" : "#d0e0f0"});
   }
-  out.note = residual.stretches.empty() ? "" : "tinted: stretches where the two-resistor simulation is off; ";
+  if (!residual.stretches.empty())
+    out.note = fmt::format("tinted: stretches where the two-resistor simulation of the {} is off; ",
+                           winding ? "winding" : "housing");
   out.note += "residual = measured - simulated";
   out.panels = {temperatures, residual, {p.heat_label, {{"", p.time_s, p.heat, "#404040"}}}};
   return wire::pc::svg(out);
