@@ -281,13 +281,19 @@ std::vector<double> told_next(std::vector<double> load) {
 /// A row sooner than that.
 std::vector<double> told_sooner(std::vector<double> load) { return a_row_sooner(told_next(std::move(load))); }
 
-/// In each row as a neighbour tells it, before it or after it by chance.
-std::vector<double> told_beside(std::vector<double> load) {
+/// In each row the most, or the least, that it and its neighbours tell: what flowed, if rows keep step with a gait.
+std::vector<double> told_around(const std::vector<double>& load, bool most) {
   const std::vector<double> told = told_next(load);
-  std::minstd_rand chance;  // of one seed: an answer does not change
-  for (std::size_t i = 1; i + 1 < load.size(); ++i) load[i] = told[chance() < chance.max() / 2 ? i - 1 : i + 1];
-  return load;
+  std::vector<double> out = told;
+  for (std::size_t i = 1; i + 1 < told.size(); ++i) {
+    for (const double x : {told[i - 1], told[i + 1]}) {
+      if ((std::abs(x) > std::abs(out[i])) == most) out[i] = x;
+    }
+  }
+  return out;
 }
+std::vector<double> told_at_crests(std::vector<double> load) { return told_around(load, true); }
+std::vector<double> told_in_troughs(std::vector<double> load) { return told_around(load, false); }
 
 /// The same logs under a load that is `as` makes it of what was measured.
 Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double> (*as)(std::vector<double>)) {
@@ -490,8 +496,8 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
   const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
   double open_K = left_open_K(problem, baseline, logs);
   if (alternates_between_rows(logs))
-    open_K = std::max(open_K,
-                      apart_K(under(problem, logs, told_last), baseline, under(problem, logs, told_beside), baseline));
+    open_K = std::max(open_K, 0.5 * apart_K(under(problem, logs, told_at_crests), baseline,
+                                            under(problem, logs, told_in_troughs), baseline));
   // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
   const bool unknown = found.verdict == Verdict::unknown_cause;
   const double asked_K = unknown ? disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K
