@@ -13,7 +13,7 @@ constexpr const char* examples =
     "Examples\n"
     "  hotcore list                                  boards that are plugged in\n"
     "  hotcore watch                                 live values and curves of both axes\n"
-    "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now?\n"
+    "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now, standing or turning?\n"
     "  hotcore run \"5A 1s, 0A 0.5s\" --axis 1         arm, play a course of current, disarm\n"
     "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
     "  hotcore backup mine.toml                      all parameters into a file\n"

@@ -115,7 +115,26 @@ void fault(Console& console, const std::string& axis, bool clear) {
   console.say(text, json);
 }
 
-void ask(Console& console, const std::string& axis, const std::string& course) {
+Json json_of(const wire::Outlook& outlook) {
+  return {{"feasible", outlook.feasible != 0},
+          {"peak_degC", number(outlook.peak_degC)},
+          {"limits_after_s", number(outlook.limits_after_s)},
+          {"share_before_limit", number(outlook.share_before_limit)}};
+}
+
+std::string sentence_of(const wire::Outlook& outlook) {
+  if (outlook.feasible != 0) return fmt::format("the hottest winding would reach {:.1f} degC", outlook.peak_degC);
+  const std::string unlimited =
+      std::isfinite(outlook.peak_degC)
+          ? fmt::format(" (unlimited, the winding would reach {:.0f} degC)", outlook.peak_degC)
+          : "";
+  return fmt::format("the limit is met after {:.2f} s and {:.0f} % of it; from there on less is delivered{}",
+                     outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
+}
+
+/// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
+/// as much, unless the caller knows that it turns.
+void ask(Console& console, const std::string& axis, const std::string& course, bool turns) {
   std::vector<wire::Segment> segments;
   float whole_s = 0;
   for (const Piece& piece : profile_in(course, wire::max_segments)) {
@@ -128,22 +147,22 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
     refuse(fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
                        wire::longest_ask_s));
   }
-  const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
-  std::string text;
-  if (outlook.feasible != 0) {
-    text = fmt::format("Yes: the hottest winding would reach {:.1f} degC.\n", outlook.peak_degC);
-  } else {
-    text =
-        fmt::format("Not in full: the limit is met after {:.2f} s and {:.0f} % of it; from there on less is delivered",
-                    outlook.limits_after_s, 100 * outlook.share_before_limit);
-    text += std::isfinite(outlook.peak_degC)
-                ? fmt::format(" (unlimited, the winding would reach {:.0f} degC).\n", outlook.peak_degC)
-                : ".\n";
-  }
-  console.say(text, {{"feasible", outlook.feasible != 0},
-                     {"peak_degC", number(outlook.peak_degC)},
-                     {"limits_after_s", number(outlook.limits_after_s)},
-                     {"share_before_limit", number(outlook.share_before_limit)}});
+  const int index = axis == "1" ? 1 : 0;
+  const wire::Outlook standing = console.session().ask(index, segments, true);
+  const wire::Outlook turning = console.session().ask(index, segments, false);
+  const bool stands = standing.feasible != 0, goes = turning.feasible != 0;
+  std::string text = stands && goes ? "Yes, standing or turning.\n"
+                     : !goes        ? "Not in full, standing or turning.\n"
+                     : turns        ? "Yes, as long as it turns.\n"
+                                    : "Not in full where the rotor stands; --turning answers for one that turns.\n";
+  text += fmt::format("  standing, the hottest phase at any angle:  {}.\n", sentence_of(standing));
+  text += fmt::format("  turning, all phases share the heat:        {}.\n", sentence_of(turning));
+  const bool by_turning = turns || (stands && !goes);
+  Json json = json_of(by_turning ? turning : standing);
+  json["assumed"] = by_turning ? "turning" : "standing";
+  json["standing"] = json_of(standing);
+  json["turning"] = json_of(turning);
+  console.say(text, json);
 }
 
 }  // namespace
@@ -154,7 +173,7 @@ void add_motion(CLI::App& app, Console& console) {
     std::vector<std::string> course;  // quoted or not
     std::string mode;
     float iq_A = 0, torque_Nm = 0, seconds = longest_s;
-    bool clear = false;
+    bool clear = false, turns = false;
   };
   const auto with_axis = [&](CLI::App* command, const std::string& otherwise, bool both) {
     auto a = std::make_shared<Arguments>();
@@ -204,7 +223,10 @@ void add_motion(CLI::App& app, Console& console) {
   command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
   a = with_axis(command, "0", false);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
-  command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " "))); });
+  command->add_flag(
+      "--turning", a->turns,
+      "the rotor turns all the time, so all phases share the heat; else the answer is for a standing one");
+  command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " ")), a->turns); });
 }
 
 }  // namespace console

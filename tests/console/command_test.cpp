@@ -181,6 +181,25 @@ TEST_F(Commands, AskSaysWhatWouldHappen) {
   EXPECT_NE(say("ask \"20A 0.3s\"").out.find("after 0.21 s"), std::string::npos);
 }
 
+TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
+  const Said said = say("ask \"20A 0.3s\"");
+  EXPECT_EQ(said.out,
+            "Not in full where the rotor stands; --turning answers for one that turns.\n"
+            "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of it; from there on "
+            "less is delivered (unlimited, the winding would reach 171 degC).\n"
+            "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC.\n");
+  const auto outlook = json("ask \"20A 0.3s\"");
+  EXPECT_EQ(outlook["assumed"], "standing");
+  EXPECT_FALSE(outlook["standing"]["feasible"]);
+  EXPECT_TRUE(outlook["turning"]["feasible"]);
+  EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Yes, as long as it turns."), 0u);
+  EXPECT_TRUE(json("ask \"20A 0.3s\" --turning")["feasible"]);
+  std::swap(board_->standing, board_->turning);  // no board should say so; then the colder answer is not taken
+  EXPECT_FALSE(json("ask \"20A 0.3s\"")["feasible"]);
+  board_->standing = board_->turning;
+  EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Not in full, standing or turning."), 0u);
+}
+
 TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }
 
 TEST_F(Commands, WatchGivesALineForEachState) {

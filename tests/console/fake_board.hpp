@@ -49,6 +49,7 @@ struct FakeBoard {
   std::uint8_t fault = 0;
   float temperature_degC = 30.0f;
   wire::FaultEvidence evidence{};
+  wire::Outlook standing{{}, 0, {}, 171.0f, 0.21f, 0.8f}, turning{{}, 1, {}, 98.0f, INFINITY, 1.0f};
   /// Sees each request before it is answered; false: no answer comes.
   std::function<bool(wire::Kind)> before = [](wire::Kind) { return true; };
   /// May change an answer's payload before it is framed.
@@ -259,7 +260,7 @@ struct FakeBoard {
         add(payload, wire::Offsets{{}, {0.01f, -0.02f, 0.03f}});
         break;
       case wire::Kind::ask:
-        add(payload, wire::Outlook{{}, 0, {}, 171.0f, 0.21f, 0.8f});
+        add(payload, frame.payload[1] != 0 ? standing : turning);
         break;
       case wire::Kind::subscribe:
         watched_ = list<wire::SignalAddress>(frame, sizeof(wire::Subscribe));
