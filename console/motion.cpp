@@ -23,14 +23,35 @@ Json summary(const Driven& d) {
           {"limit", wire::text_of(d.limit).name}};
 }
 
-void play(Console& console, const std::string& axis, const std::vector<Piece>& profile) {
+/// Before anything is armed: a course whose unit an axis does not take. Names the command that helps.
+void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
+  const wire::State state = console.session().state();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask >> a & 1) == 0 || state.axis[a].control == mode) continue;
+    const std::string command = fmt::format("mode {} --axis {}", wire::text_of(mode), a);
+    throw UserError(Exit::refused,
+                    fmt::format("Axis {} is in {} mode and takes no {}; {}.", a, wire::text_of(state.axis[a].control),
+                                unit_of(mode),
+                                console.options.sim ? "a board of --sim is gone with its process, so say '" + command +
+                                                          "' at the prompt of 'hotcore --sim', then this"
+                                                    : "say 'hotcore " + command + "' first"));
+  }
+}
+
+/// `once_armed`: told when the first setpoint was taken.
+void play(Console& console, const std::string& axis, const std::vector<Piece>& profile,
+          const std::string& once_armed = "") {
   Session& session = console.session();
   const std::uint8_t mask = mask_of(axis);
+  need_mode(console, mask, profile.front().mode);
   Live live(mask);
   Driven driven;
   {
     Armed armed(session, mask);
+    bool told = once_armed.empty();
     driven = drive(session, mask, profile, Along::q, [&](const wire::State& state, double time_s) {
+      if (!told) console.tell(once_armed);
+      told = true;
       if (!console.options.json) live.show(state, time_s);
     });
   }
@@ -48,8 +69,7 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
 
 /// Armed at a steady level until Ctrl-C or for so long.
 void arm(Console& console, const std::string& axis, const Piece& piece) {
-  console.tell(fmt::format("Armed at {:g} {}; Ctrl-C disarms.", piece.level, unit_of(piece.mode)));
-  play(console, axis, {piece});
+  play(console, axis, {piece}, fmt::format("Armed at {:g} {}; Ctrl-C disarms.", piece.level, unit_of(piece.mode)));
 }
 
 /// What setpoints mean: chosen if `wish` names one, and told.

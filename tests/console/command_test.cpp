@@ -135,8 +135,11 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   EXPECT_EQ(json("run \"50mNm 0.1s, 0Nm 0.1s\" --axis 1")["peak_A"].get<float>(),
             0.05f);  // the script's board: as asked
   EXPECT_EQ(say("arm --torque 0.2 --seconds 0.1 --axis 1").code, 0);
-  refused("run \"20A 1s\" --axis 1", 8, "Axis 1 refused the setpoint 20 A: the setpoint has another unit");
-  refused("run \"1Nm 1s\"", 8, "Axis 0 refused the setpoint 1 N m: the setpoint has another unit");
+  refused("run \"20A 1s\" --axis 1", 8,
+          "Axis 1 is in torque mode and takes no A; a board of --sim is gone with its process, so say "
+          "'mode current --axis 1' at the prompt of 'hotcore --sim', then this.");
+  refused("run \"1Nm 1s\"", 8, "Axis 0 is in current mode and takes no N m");
+  refused("arm --torque 0.01 --axis both", 8, "'mode torque --axis 0'");
   EXPECT_EQ(board_->armed, 0);
   board_->armed = 2;
   refused("mode current", 8, "refused to put both axes in current mode: axis 0: the axis is armed");
@@ -144,6 +147,25 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   refused("run \"1A 1s, 1Nm 1s\"", 2, "has another unit than the pieces before it");
   refused("ask \"1Nm 1s\"", 2, "takes amperes");
   refused("arm --iq 1 --torque 1", 2, "excludes");
+}
+
+TEST_F(Commands, ArmedIsSaidOnceItIs) {
+  EXPECT_EQ(say("arm --iq 2 --seconds 0.1").err, "Armed at 2 A; Ctrl-C disarms.\n");
+  refused("arm --iq 1e9", 8, "Axis 0 refused the setpoint 1e+09 A: the setpoint is not a number or beyond any board");
+  board_->fault = static_cast<std::uint8_t>(wire::Fault::over_current);
+  refused("arm --iq 2", 8, "refused to arm axis 0: the axis has tripped");
+  EXPECT_EQ(board_->armed, 0);
+}
+
+TEST_F(Commands, AWrongModeIsToldWithTheCommandThatHelps) {
+  testing::internal::CaptureStderr();
+  console_.options.sim = false;
+  (void)console_.session();
+  const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("arm --torque 0.01 --axis 1"); });
+  EXPECT_EQ(code, 8);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "Axis 1 is in current mode and takes no N m; say 'hotcore mode torque --axis 1' first.\n");
+  EXPECT_EQ(board_->armed, 0);
 }
 
 TEST_F(Commands, AFaultIsClearedInEitherMode) {

@@ -243,6 +243,8 @@ struct FakeBoard {
           if ((asked.mask >> a & 1) == 0) continue;
           if (asked.mode[a] != control[a])
             refused_[a] = static_cast<std::uint8_t>(wire::Status::other_mode);
+          else if (!(std::abs(asked.q[a]) < 1000.0f))
+            refused_[a] = static_cast<std::uint8_t>(wire::Status::not_a_current);
           else
             asked_A_[a] = asked.q[a];
         }
