@@ -236,9 +236,16 @@ TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
   EXPECT_NEAR(said["rows"], 101, 1);
   const std::string text = content(path("x.csv"));
   EXPECT_NE(text.find("# board: fake FAKE01\n# firmware: 0.1\n# parameters: "), std::string::npos) << text;
-  EXPECT_NE(text.find("\ntime_s,id_A,iq_A,speed_rad_per_s,bus_V,housing_degC,core_a_degC\n"), std::string::npos)
+  EXPECT_NE(text.find("\ntime_s,id_A,iq_A,speed_rad_per_s,bus_V,housing_degC,core_a_degC,mode,limit\n"),
+            std::string::npos)
       << text;
-  EXPECT_NE(text.find("\n0.020000,21,22,36,34,91,85\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n0.020000,21,22,36,34,91,85,37,38\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n# mode: 0 off, 1 ready, 2 running, 3 tripped\n# limit: 0 none, 97 hardware, 98 core_hot, "),
+            std::string::npos)
+      << text;
+  const std::string limits = text.substr(text.find("# limit:"), text.find("time_s,") - text.find("# limit:"));
+  EXPECT_NE(limits.find(", 106 thermal_late\n"), std::string::npos) << limits;  // and no fault or status among them
+  EXPECT_EQ(limits.find("over_current"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path("x.csv.part")));
 }
 
@@ -326,6 +333,32 @@ TEST_F(Commands, AnAnswerThatComesTooLateIsNotTakenForTheNext) {
   EXPECT_EQ(session.state().axis[0].core_degC, 99.0f);
 }
 
+TEST_F(Commands, AFileThatIsThereStaysUnlessForceIsSaid) {
+  const auto old = [&](const std::string& name) { std::ofstream(path(name)) << "old"; };
+  const std::string to_log = "log --seconds 0.1 --out ", to_capture = "capture axis0.iq_A --out ";
+  for (const std::string& line : {to_log + path("x.csv"), to_capture + path("c.csv"), "backup " + path("b.toml")}) {
+    const std::string name = line.substr(line.rfind('/') + 1);
+    old(name);
+    refused(line, 2, name + ": there is such a file already; choose another name, or say --force to write over it.");
+    EXPECT_EQ(content(path(name)), "old");
+    EXPECT_EQ(say(line + " --force").code, 0);
+    EXPECT_GT(content(path(name)).size(), 10u);
+  }
+  std::filesystem::create_directories(path("i"));
+  old("i/log.csv");
+  refused("identify --out " + path("i"), 2, "i/log.csv: there is such a file already");
+  EXPECT_EQ(content(path("i/log.csv")), "old");
+}
+
+TEST_F(Commands, AFolderThatIsMissingIsToldAndNotMade) {
+  for (const std::string line : {"log --seconds 0.1 --out ", "capture axis0.iq_A --out ", "backup "}) {
+    refused(line + path("no/x"), 2, "no/x: there is no folder " + path("no") + "; make it, or choose another place.");
+    refused(line + folder_.string(), 2, "this is a folder");
+  }
+  EXPECT_TRUE(is_empty());
+  EXPECT_EQ(board_->setpoints, 0);
+}
+
 TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
   int gets = 0;
   board_->before = [&](Kind kind) { return kind != Kind::get || !(board_->unplugged = ++gets == 1); };
@@ -336,7 +369,7 @@ TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
 TEST_F(Commands, ABackupKeepsTheOldFileWhenItFails) {
   std::ofstream(path("mine.toml")) << "old";
   board_->before = [&](Kind kind) { return kind != Kind::get; };
-  refused("backup " + path("mine.toml"), 7, "no answer");
+  refused("backup --force " + path("mine.toml"), 7, "no answer");
   EXPECT_EQ(content(path("mine.toml")), "old");
 }
 
@@ -448,7 +481,7 @@ TEST_F(Commands, WrongCommandLinesGetOneSentence) {
   refused("arm --axis 2", 2, "--axis");
   refused("set current_limit_A", 2, "write name=value");
   refused("capture axis0.iq_A --pre 2000 --post 2000", 2, "at most 1024 rows");
-  refused("log --out /proc/nowhere/x.csv --seconds 1", 2, "cannot be written");
+  refused("log --out /proc/x.csv --seconds 1", 2, "cannot be written");
   refused("captre iq_A", 2, "There is no command 'captre', did you mean 'capture'?");
   refused("stop now", 2, "'now' was not expected");
   refused("get --bogus", 2, "'--bogus' was not expected");
@@ -488,6 +521,20 @@ TEST(Profile, UnitsAreUnderstood) {
   EXPECT_FLOAT_EQ(pieces[1].level, -0.5f);
   EXPECT_FLOAT_EQ(pieces[1].seconds, 0.2f);
   EXPECT_FLOAT_EQ(pieces[2].seconds, 120.0f);
+}
+
+TEST(Profile, BlanksAndSemicolonsAreTakenAsAPersonWritesThem) {
+  const auto pieces = console::profile_in(" 20 A 0.3 s; 6A 5s ,\t-1.5 A  20 ms \t;", 10);
+  ASSERT_EQ(pieces.size(), 3u);
+  EXPECT_FLOAT_EQ(pieces[0].level, 20.0f);
+  EXPECT_FLOAT_EQ(pieces[0].seconds, 0.3f);
+  EXPECT_FLOAT_EQ(pieces[1].seconds, 5.0f);
+  EXPECT_FLOAT_EQ(pieces[2].level, -1.5f);
+  const auto torque = console::profile_in("50 mNm 0.3 s; 0 Nm 1 s", 10);
+  EXPECT_EQ(torque.front().mode, wire::ControlMode::torque);
+  EXPECT_FLOAT_EQ(torque.front().level, 0.05f);
+  for (const char* wrong : {"", ";", "5A 1s;;5A 1s", "5A: 1s", "5 5 5", "A 1s"})
+    EXPECT_THROW((void)console::profile_in(wrong, 10), wire::pc::UserError) << wrong;
 }
 
 TEST(Plot, AStepIsConnectedAndStaysInsideItsFrame) {

@@ -35,9 +35,9 @@ struct FakeBoard {
       {0x0105, "pole_pairs", "count", "whole number", 1.0f, 50.0f, 1.0f, wire::whole_number},
       {0x0111, "current_limit", "A", "amplitude", 0.0f, 100.0f, 20.0f},
       {0x0201, "fan_delay", "s", "of the whole board", 0.0f, 60.0f, 5.0f, 0, 1}};
-  std::vector<Signal> signals = {{0x01, "id", "A"},        {0x02, "iq", "A"},
-                                 {0x0E, "bus", "V"},       {0x10, "speed", "rad/s"},
-                                 {0x41, "core_a", "degC"}, {0x47, "housing_measured", "degC"}};
+  std::vector<Signal> signals = {{0x01, "id", "A"},        {0x02, "iq", "A"},        {0x0E, "bus", "V"},
+                                 {0x10, "speed", "rad/s"}, {0x41, "core_a", "degC"}, {0x47, "housing_measured", "degC"},
+                                 {0x11, "mode", ""},       {0x12, "limit", ""}};
 
   // What a test looks at or bends.
   std::uint16_t protocol = wire::protocol_version;
