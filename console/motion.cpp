@@ -148,8 +148,10 @@ std::string sentence_of(const wire::Outlook& outlook) {
       std::isfinite(outlook.peak_degC)
           ? fmt::format(" (unlimited, the winding would reach {:.0f} degC)", outlook.peak_degC)
           : "";
-  return fmt::format("the limit is met after {:.2f} s and {:.0f} % of it; from there on less is delivered{}",
-                     outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
+  return fmt::format(
+      "the limit is met after {:.2f} s and {:.0f} % of the ampere-seconds; from there on less "
+      "is delivered{}",
+      outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
 }
 
 /// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
@@ -192,6 +194,7 @@ void add_motion(CLI::App& app, Console& console) {
     std::string axis;
     std::vector<std::string> course;  // quoted or not
     std::string mode;
+    int times = 1;
     float iq_A = 0, torque_Nm = 0, seconds = longest_s;
     bool clear = false, turns = false;
   };
@@ -224,8 +227,15 @@ void add_motion(CLI::App& app, Console& console) {
   a = with_axis(command, "0", true);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\", in torque mode \"50mNm 1s\"")
       ->required();
-  command->callback(
-      [&console, a] { play(console, a->axis, profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000)); });
+  command->add_option("--times", a->times, "play it so often, one after the other")
+      ->capture_default_str()
+      ->check(between(1, 1000));
+  command->callback([&console, a] {
+    const std::vector<Piece> once = profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000);
+    std::vector<Piece> course;
+    for (int i = 0; i < a->times; ++i) course.insert(course.end(), once.begin(), once.end());
+    play(console, a->axis, course);
+  });
 
   command = app.add_subcommand("stop", "disarm");
   a = with_axis(command, "both", true);

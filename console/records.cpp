@@ -48,6 +48,8 @@ std::vector<Target> signals_named(Console& console, const std::vector<std::strin
   return targets;
 }
 
+constexpr double least_span = 1e-3;  // of a scale; a steady signal is a line, not its last digit
+
 /// Chosen signals as curves, one plot a unit.
 class Curves {
  public:
@@ -60,14 +62,17 @@ class Curves {
     }
   }
 
-  std::string drawn(int width, int height, bool colours) const {
+  std::string drawn(int width, int height, bool colours) {
     std::map<std::string, std::vector<PlotLine>> by_unit;
     for (std::size_t s = 0; s < signals_.size(); ++s) {
       const float last = trails_[s].empty() ? std::nanf("") : trails_[s].back();
       by_unit[signals_[s].what->unit].push_back({fmt::format("{} {:.4g}", full_name(signals_[s]), last), trails_[s]});
     }
     std::string text;
-    for (const auto& [unit, lines] : by_unit) text += plot(lines, width, height, 1e-3f, colours);
+    for (const auto& [unit, lines] : by_unit) {
+      Scale& scale = scales_.try_emplace(unit, Scale{unit, least_span}).first->second;
+      text += plot(lines, scale, width, height, colours);
+    }
     return text;
   }
 
@@ -81,6 +86,7 @@ class Curves {
  private:
   std::vector<Target> signals_;
   std::vector<std::vector<float>> trails_;
+  std::map<std::string, Scale> scales_;  // by unit
 };
 
 /// Chosen signals, by telemetry.
@@ -225,7 +231,8 @@ void capture(Console& console, const CaptureArguments& a) {
   std::string text;
   for (std::size_t s = 0; s < lines.size(); ++s) {
     lines[s].label = columns[s];
-    text += plot({lines[s]}, terminal_width(), 6, 1e-3f, on_terminal());
+    Scale scale{signals[s].what->unit, least_span};
+    text += plot({lines[s]}, scale, terminal_width(), 6, on_terminal());
   }
   text += fmt::format("Written: {} ({} rows, {} of them before the trigger; the picture shows the last ones).\n",
                       a.path, status.rows, status.pre);

@@ -124,6 +124,8 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   EXPECT_EQ(summary["peak_A"], 5.0);
   EXPECT_NEAR(board_->setpoints, 60, 4);  // 200 a second
   EXPECT_EQ(board_->armed, 0);
+  EXPECT_NEAR(json("run \"5A 0.2s, 0A 0.1s\" --times 3")["seconds"], 0.9, 0.02);
+  refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
 TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
@@ -158,9 +160,9 @@ TEST_F(Commands, ArmedIsSaidOnceItIs) {
 }
 
 TEST_F(Commands, AWrongModeIsToldWithTheCommandThatHelps) {
-  testing::internal::CaptureStderr();
+  EXPECT_EQ(say("mode").code, 0);  // there is a board now, and from here on it counts as a real one
   console_.options.sim = false;
-  (void)console_.session();
+  testing::internal::CaptureStderr();
   const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("arm --torque 0.01 --axis 1"); });
   EXPECT_EQ(code, 8);
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
@@ -207,7 +209,8 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
   const Said said = say("ask \"20A 0.3s\"");
   EXPECT_EQ(said.out,
             "Not in full where the rotor stands; --turning answers for one that turns.\n"
-            "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of it; from there on "
+            "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of the "
+            "ampere-seconds; from there on "
             "less is delivered (unlimited, the winding would reach 171 degC).\n"
             "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC.\n");
   const auto outlook = json("ask \"20A 0.3s\"");
@@ -538,16 +541,40 @@ TEST(Profile, BlanksAndSemicolonsAreTakenAsAPersonWritesThem) {
 }
 
 TEST(Plot, AStepIsConnectedAndStaysInsideItsFrame) {
-  const std::string text = console::plot({{"x", {0, 0, 0, 8, 8, 8}}}, 20, 2, 1.0f, false);
+  console::Scale scale{"A", 1};
+  const std::string text = console::plot({{"x", {0, 0, 0, 8, 8, 8}}}, scale, 24, 2, false);
   EXPECT_EQ(text,
-            "       8          \u28B8\u2809\n"
-            "       0         \u28C0\u2878 \n"
-            "         x\n")
+            "         8 A          \u28B8\u2809\n"
+            "         0 A         \u28C0\u2878 \n"
+            "             x\n")
       << text;
   const float huge = std::numeric_limits<float>::max();
-  for (const std::vector<float>& values : {std::vector<float>{huge, -huge, std::nanf(""), INFINITY}, {}, {0.0f}}) {
-    const std::string shown = console::plot({{"x", values}}, 20, 3, 1.0f, false);
+  for (const std::vector<float>& values :
+       {std::vector<float>{huge, -huge, std::nanf(""), INFINITY}, {}, {0.0f}, {huge}, {1e-30f}}) {
+    console::Scale fresh{"A", 1e-3};
+    const std::string shown = console::plot({{"x", values}}, fresh, 20, 3, false);
     EXPECT_EQ(std::count(shown.begin(), shown.end(), '\n'), 4) << shown;
+    EXPECT_TRUE(std::isfinite(fresh.low) && std::isfinite(fresh.high));
+  }
+}
+
+TEST(Plot, TheScaleHasItsUnitEndsAtRoundNumbersAndOnlyGrows) {
+  console::Scale scale{"degC", 10};
+  const auto first_line = [&](const std::vector<float>& values) {
+    const std::string text = console::plot({{"core", values}}, scale, 40, 4, false);
+    return text.substr(0, text.find("C ") + 1);
+  };
+  EXPECT_EQ(first_line({29.28f}), "     36 degC");
+  EXPECT_EQ(scale.low, 24);
+  EXPECT_EQ(first_line({29.1f}), "     36 degC");  // inside: as it was
+  EXPECT_EQ(first_line({38.4f}), "     40 degC");
+  EXPECT_EQ(scale.low, 20);
+  double low = scale.low, high = scale.high;
+  for (float value = 30; value < 200; value += value * 0.05f) {
+    (void)first_line({value, 60 - value});
+    EXPECT_TRUE(scale.low <= low && scale.high >= high) << value;
+    EXPECT_TRUE(scale.low <= double{60 - value} && scale.high >= double{value}) << value;
+    low = scale.low, high = scale.high;
   }
 }
 
