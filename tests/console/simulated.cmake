@@ -16,7 +16,7 @@ expect(restore 0 "Nothing changed" ${sim} restore mine.toml)
 expect(arm 0 "Done in 0.5" ${sim} arm --iq 1 --seconds 0.5)
 expect(run 0 "Done in 0.5.*peak current 5.*disarmed|disarmed: peak current 5" ${sim} run "5A 0.3s, 0A 0.2s" --axis 1)
 # The README's: a free shaft shaken to and fro, so that heat and no speed limits it; the winding is allowed 155 degC.
-expect(run_until_hot 0 "core_hot.*peak 1[0-4][0-9].*Held back for [12].*because the winding is close to its limit" ${sim} run "20A 20ms, -20A 40ms, 20A 20ms" --times 40)
+expect(run_until_hot 0 "core_hot.*peak 1[0-4][0-9].*Held back for [23].*because the winding is close to its limit" ${sim} run "20A 20ms, -20A 40ms, 20A 20ms" --times 40)
 expect(mode 0 "axis 0: current mode, setpoints in A.*axis 1: current mode" ${sim} mode)
 expect(run_in_the_wrong_mode 8 "^Axis 0 is in current mode and takes no N m.*'mode torque --axis 0' at the prompt" ${sim} run "20mNm 0.3s")
 expect(arm_beyond_any_board 8 "^Axis 0 refused the setpoint 1e.09 A: .*beyond any board" ${sim} arm --iq 1e9)

@@ -25,7 +25,8 @@ std::vector<std::string> toml_names(const std::string& folder) {
 
 std::string find_toml(const std::string& kind, const std::string& which, const std::string& folder) {
   std::error_code none;
-  const std::vector<std::string> known = toml_names(folder);
+  // What lies in the working folder may be anything.
+  const std::vector<std::string> known = folder == "." ? std::vector<std::string>{} : toml_names(folder);
   const std::string named = known.empty() ? "" : fmt::format(", or one of: {}", fmt::join(known, ", "));
   if (fs::is_directory(which, none)) refuse(fmt::format("{}: this is a folder; give a .toml file{}.", which, named));
   if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
