@@ -15,7 +15,7 @@ constexpr const char* examples =
     "  hotcore watch                                 live values and curves of both axes\n"
     "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now, standing or turning?\n"
     "  hotcore run \"5A 1s, 0A 0.5s\" --axis 1         arm, play a course of current, disarm\n"
-    "  hotcore --sim run \"20A 20ms, -20A 40ms, 20A 20ms\" --times 40   shaken until the winding's limit holds it back\n"
+    "  hotcore --sim run \"20A 20ms, -20A 40ms, 20A 20ms\" --times 40   shaken until heat limits it\n"
     "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
     "  hotcore backup mine.toml                      all parameters into a file\n"
     "  hotcore log --out run.csv --seconds 60        a log that identify reads as it is\n"

@@ -253,9 +253,7 @@ void add_motion(CLI::App& app, Console& console) {
   command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
   a = with_axis(command, "0", false);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
-  command->add_flag(
-      "--turning", a->turns,
-      "the rotor turns all the time, so all phases share the heat; else the answer is for a standing one");
+  command->add_flag("--turning", a->turns, "answer for a rotor that turns all the time; else for one that may stand");
   command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " ")), a->turns); });
 }
 

@@ -267,12 +267,11 @@ void add_records(CLI::App& app, Console& console) {
 
   auto l = std::make_shared<Arguments>();
   l->axis = "0", l->rate_Hz = 100;
-  command = app.add_subcommand(
-      "log",
-      "write telemetry of one axis to a file that 'identify' reads as it is; what the numbers of mode, limit and fault "
-      "mean stands in its first lines");
+  command = app.add_subcommand("log", "write telemetry of one axis to a file that 'identify' reads as it is");
   command->add_option("SIGNAL", l->names, "signals; without any, what identify needs and what the board estimates");
-  command->add_option("--out", l->path, "a new .csv file")->required();
+  command
+      ->add_option("--out", l->path, "a new .csv file; what the codes of mode, limit and fault mean stands at its top")
+      ->required();
   command->add_option("--axis", l->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   command->add_option("--rate", l->rate_Hz, "rows a second, at most the PWM frequency")
       ->capture_default_str()
