@@ -64,7 +64,7 @@ Values values_of(Session& session, int axis) {
 struct Arguments {
   std::string axis = "0", out = "out/identify";
   double minutes = 20;
-  bool yes = false, save = false;
+  bool yes = false, save = false, force = false;
 };
 
 /// Drives the designed course and logs it.
@@ -108,12 +108,15 @@ bool agreed(Console& console, const Arguments& a) {
 }
 
 void identify(Console& console, const Arguments& a) {
+  const std::string log = a.out + "/log.csv", sheet = a.out + "/motor.toml", json = a.out + "/answer.json",
+                    model = a.out + "/model.toml";
+  std::error_code told_below;
+  std::filesystem::create_directories(a.out, told_below);
+  wire::pc::need_new_file(log, a.force);
   Session& session = console.session();
   const int axis = a.axis == "1" ? 1 : 0;
   const Values before = values_of(session, axis);
   const double rated_A = continuous_A(before);
-  const std::string log = a.out + "/log.csv", sheet = a.out + "/motor.toml", json = a.out + "/answer.json",
-                    model = a.out + "/model.toml";
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
   console.tell(
@@ -184,6 +187,7 @@ void add_identify(CLI::App& app, Console& console) {
   command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
   command->add_flag("--yes", a->yes, "write what was found without asking");
   command->add_flag("--save", a->save, "and keep it over a reset");
+  command->add_flag("--force", a->force, "write over the log that is in the folder");
   command->callback([&console, a] { identify(console, *a); });
 }
 

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 
-#include "console/plot.hpp"
-
 namespace console {
 namespace {
 
@@ -86,10 +84,10 @@ void Live::show(const wire::State& state, double time_s) {
       const std::string head = fmt::format("axis {} ", a);
       text += plot({{head + label("core", axis.core_degC, "degC"), trail.core_degC},
                     {label("housing", axis.housing_degC, "degC"), trail.housing_degC}},
-                   terminal_width(), 6, 10.0f, true);
+                   trail.heat, terminal_width(), 6, true);
       text += plot({{head + label("iq", axis.iq_A, "A"), trail.iq_A},
                     {label("allowance", axis.allowance_A, "A"), trail.allowance_A}},
-                   terminal_width(), 4, 1.0f, true);
+                   trail.current, terminal_width(), 4, true);
     }
     // Up over what was drawn last, then each line over the old one; \033[K clears what the old one had more.
     std::string drawn = lines_ > 0 ? fmt::format("\033[{}A", lines_) : "";

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "console/console.hpp"
+#include "console/plot.hpp"
 
 namespace console {
 
@@ -24,6 +25,7 @@ class Live {
  private:
   struct Trail {
     std::vector<float> core_degC, housing_degC, iq_A, allowance_A;
+    Scale heat{"degC", 10}, current{"A", 1};
   };
   std::string table(const wire::State& state, double time_s) const;
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "console/live.hpp"
 #include "console/parameter_file.hpp"
 
 namespace console {
@@ -23,20 +24,43 @@ std::string column_name(const Target& signal) {
   return name;
 }
 
-std::string preamble(Session& session, const std::string& what) {
+namespace {
+
+/// What the numbers of a signal mean; empty for a quantity.
+std::string legend(const std::string& signal) {
+  std::vector<std::string> meanings;
+  if (signal == "mode") {
+    for (std::uint8_t mode = 0; mode < 4; ++mode) meanings.push_back(fmt::format("{} {}", mode, mode_text(mode)));
+  } else if (signal == "limit" || signal == "fault") {
+    meanings.push_back("0 none");
+    for (const wire::CodeText& code : wire::code_texts) {  // faults, then limits, then what refuses
+      const bool is_fault = code.number < static_cast<std::uint8_t>(wire::Limit::hardware);
+      const bool refuses = code.number >= static_cast<std::uint8_t>(wire::Status::parameters_unset);
+      if (!refuses && is_fault == (signal == "fault")) meanings.push_back(fmt::format("{} {}", code.number, code.name));
+    }
+  }
+  return fmt::to_string(fmt::join(meanings, ", "));
+}
+
+}  // namespace
+
+std::string preamble(Session& session, const std::string& what, const std::vector<Target>& signals) {
   const wire::Hello& hello = session.hello();
   const std::vector<Target> targets = session.parameters().all();
+  std::string legends;
+  for (const Target& signal : signals) {
+    const std::string name = full_name(*signal.what), meaning = legend(name);
+    const std::string line = fmt::format("# {}: {}\n", name, meaning);
+    if (!meaning.empty() && legends.find(line) == std::string::npos) legends += line;
+  }
   return fmt::format(
-      "# hotcore log: {}\n# board: {} {}\n# firmware: {}\n# parameters: {:08x}\n# recorded: {:%Y-%m-%dT%H:%M:%SZ}\n",
+      "# hotcore log: {}\n# board: {} {}\n# firmware: {}\n# parameters: {:08x}\n# recorded: {:%Y-%m-%dT%H:%M:%SZ}\n{}",
       what, hello.board, hello.serial, hello.firmware, hash_of(targets, session.get(targets)),
-      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())), legends);
 }
 
 LogFile::LogFile(const std::string& path, const std::string& preamble, const std::vector<std::string>& columns)
     : path_(path), unfinished_(path + ".part") {
-  std::error_code error;
-  const auto folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
   out_.open(unfinished_, std::ios::binary);
   out_ << preamble << "time_s," << fmt::format("{}", fmt::join(columns, ",")) << "\n";
   if (!out_) refuse(path + ": cannot be written; choose another folder or make room.");

@@ -17,8 +17,8 @@ namespace console {
 /// the board estimates is called so.
 std::string column_name(const Target& signal);
 
-/// The preamble's lines; fetches the parameters for their hash.
-std::string preamble(Session& session, const std::string& what);
+/// The preamble's lines, with what the numbers mean where a signal is a code; fetches the parameters for their hash.
+std::string preamble(Session& session, const std::string& what, const std::vector<Target>& signals);
 
 class LogFile {
  public:

@@ -23,14 +23,35 @@ Json summary(const Driven& d) {
           {"limit", wire::text_of(d.limit).name}};
 }
 
-void play(Console& console, const std::string& axis, const std::vector<Piece>& profile) {
+/// Before anything is armed: a course whose unit an axis does not take. Names the command that helps.
+void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
+  const wire::State state = console.session().state();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask >> a & 1) == 0 || state.axis[a].control == mode) continue;
+    const std::string command = fmt::format("mode {} --axis {}", wire::text_of(mode), a);
+    throw UserError(Exit::refused,
+                    fmt::format("Axis {} is in {} mode and takes no {}; {}.", a, wire::text_of(state.axis[a].control),
+                                unit_of(mode),
+                                console.options.sim ? "a board of --sim is gone with its process, so say '" + command +
+                                                          "' at the prompt of 'hotcore --sim', then this"
+                                                    : "say 'hotcore " + command + "' first"));
+  }
+}
+
+/// `once_armed`: told when the first setpoint was taken.
+void play(Console& console, const std::string& axis, const std::vector<Piece>& profile,
+          const std::string& once_armed = "") {
   Session& session = console.session();
   const std::uint8_t mask = mask_of(axis);
+  need_mode(console, mask, profile.front().mode);
   Live live(mask);
   Driven driven;
   {
     Armed armed(session, mask);
+    bool told = once_armed.empty();
     driven = drive(session, mask, profile, Along::q, [&](const wire::State& state, double time_s) {
+      if (!told) console.tell(once_armed);
+      told = true;
       if (!console.options.json) live.show(state, time_s);
     });
   }
@@ -48,8 +69,7 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
 
 /// Armed at a steady level until Ctrl-C or for so long.
 void arm(Console& console, const std::string& axis, const Piece& piece) {
-  console.tell(fmt::format("Armed at {:g} {}; Ctrl-C disarms.", piece.level, unit_of(piece.mode)));
-  play(console, axis, {piece});
+  play(console, axis, {piece}, fmt::format("Armed at {:g} {}; Ctrl-C disarms.", piece.level, unit_of(piece.mode)));
 }
 
 /// What setpoints mean: chosen if `wish` names one, and told.
@@ -115,7 +135,28 @@ void fault(Console& console, const std::string& axis, bool clear) {
   console.say(text, json);
 }
 
-void ask(Console& console, const std::string& axis, const std::string& course) {
+Json json_of(const wire::Outlook& outlook) {
+  return {{"feasible", outlook.feasible != 0},
+          {"peak_degC", number(outlook.peak_degC)},
+          {"limits_after_s", number(outlook.limits_after_s)},
+          {"share_before_limit", number(outlook.share_before_limit)}};
+}
+
+std::string sentence_of(const wire::Outlook& outlook) {
+  if (outlook.feasible != 0) return fmt::format("the hottest winding would reach {:.1f} degC", outlook.peak_degC);
+  const std::string unlimited =
+      std::isfinite(outlook.peak_degC)
+          ? fmt::format(" (unlimited, the winding would reach {:.0f} degC)", outlook.peak_degC)
+          : "";
+  return fmt::format(
+      "the limit is met after {:.2f} s and {:.0f} % of the ampere-seconds; from there on less "
+      "is delivered{}",
+      outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
+}
+
+/// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
+/// as much, unless the caller knows that it turns.
+void ask(Console& console, const std::string& axis, const std::string& course, bool turns) {
   std::vector<wire::Segment> segments;
   float whole_s = 0;
   for (const Piece& piece : profile_in(course, wire::max_segments)) {
@@ -128,22 +169,22 @@ void ask(Console& console, const std::string& axis, const std::string& course) {
     refuse(fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
                        wire::longest_ask_s));
   }
-  const wire::Outlook outlook = console.session().ask(axis == "1" ? 1 : 0, segments);
-  std::string text;
-  if (outlook.feasible != 0) {
-    text = fmt::format("Yes: the hottest winding would reach {:.1f} degC.\n", outlook.peak_degC);
-  } else {
-    text =
-        fmt::format("Not in full: the limit is met after {:.2f} s and {:.0f} % of it; from there on less is delivered",
-                    outlook.limits_after_s, 100 * outlook.share_before_limit);
-    text += std::isfinite(outlook.peak_degC)
-                ? fmt::format(" (unlimited, the winding would reach {:.0f} degC).\n", outlook.peak_degC)
-                : ".\n";
-  }
-  console.say(text, {{"feasible", outlook.feasible != 0},
-                     {"peak_degC", number(outlook.peak_degC)},
-                     {"limits_after_s", number(outlook.limits_after_s)},
-                     {"share_before_limit", number(outlook.share_before_limit)}});
+  const int index = axis == "1" ? 1 : 0;
+  const wire::Outlook standing = console.session().ask(index, segments, true);
+  const wire::Outlook turning = console.session().ask(index, segments, false);
+  const bool stands = standing.feasible != 0, goes = turning.feasible != 0;
+  std::string text = stands && goes ? "Yes, standing or turning.\n"
+                     : !goes        ? "Not in full, standing or turning.\n"
+                     : turns        ? "Yes, as long as it turns.\n"
+                                    : "Not in full where the rotor stands; --turning answers for one that turns.\n";
+  text += fmt::format("  standing, the hottest phase at any angle:  {}.\n", sentence_of(standing));
+  text += fmt::format("  turning, all phases share the heat:        {}.\n", sentence_of(turning));
+  const bool by_turning = turns || (stands && !goes);
+  Json json = json_of(by_turning ? turning : standing);
+  json["assumed"] = by_turning ? "turning" : "standing";
+  json["standing"] = json_of(standing);
+  json["turning"] = json_of(turning);
+  console.say(text, json);
 }
 
 }  // namespace
@@ -153,8 +194,9 @@ void add_motion(CLI::App& app, Console& console) {
     std::string axis;
     std::vector<std::string> course;  // quoted or not
     std::string mode;
+    int times = 1;
     float iq_A = 0, torque_Nm = 0, seconds = longest_s;
-    bool clear = false;
+    bool clear = false, turns = false;
   };
   const auto with_axis = [&](CLI::App* command, const std::string& otherwise, bool both) {
     auto a = std::make_shared<Arguments>();
@@ -185,8 +227,15 @@ void add_motion(CLI::App& app, Console& console) {
   a = with_axis(command, "0", true);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 0A 1s, 6A 5s\", in torque mode \"50mNm 1s\"")
       ->required();
-  command->callback(
-      [&console, a] { play(console, a->axis, profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000)); });
+  command->add_option("--times", a->times, "play it so often, one after the other")
+      ->capture_default_str()
+      ->check(between(1, 1000));
+  command->callback([&console, a] {
+    const std::vector<Piece> once = profile_in(fmt::to_string(fmt::join(a->course, " ")), 1000);
+    std::vector<Piece> course;
+    for (int i = 0; i < a->times; ++i) course.insert(course.end(), once.begin(), once.end());
+    play(console, a->axis, course);
+  });
 
   command = app.add_subcommand("stop", "disarm");
   a = with_axis(command, "both", true);
@@ -204,7 +253,8 @@ void add_motion(CLI::App& app, Console& console) {
   command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
   a = with_axis(command, "0", false);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
-  command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " "))); });
+  command->add_flag("--turning", a->turns, "answer for a rotor that turns all the time; else for one that may stand");
+  command->callback([&console, a] { ask(console, a->axis, fmt::to_string(fmt::join(a->course, " ")), a->turns); });
 }
 
 }  // namespace console

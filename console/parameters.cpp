@@ -135,7 +135,8 @@ void diff(Console& console, const std::string& path) {
   console.say(text, {{"against", against}, {"differences", json}});
 }
 
-void backup(Console& console, const std::string& path) {
+void backup(Console& console, const std::string& path, bool force) {
+  wire::pc::need_new_file(path, force);
   const Held held = all_of(console);
   wire::pc::write_whole(path, parameter_file(console.session(), held.targets, held.values));
   console.say(fmt::format("Written: {} ({} parameters in force).\n", path, held.targets.size()),
@@ -152,7 +153,7 @@ void add_parameters(CLI::App& app, Console& console) {
   struct Arguments {
     std::vector<std::string> names;
     std::string path;
-    bool save = false, names_only = false;
+    bool save = false, names_only = false, force = false;
   };
   auto a = std::make_shared<Arguments>();
 
@@ -175,7 +176,8 @@ void add_parameters(CLI::App& app, Console& console) {
 
   command = app.add_subcommand("backup", "write all parameters into a file");
   command->add_option("FILE", a->path, "a new .toml file")->required();
-  command->callback([&console, a] { backup(console, a->path); });
+  command->add_flag("--force", a->force, "write over a file that is there");
+  command->callback([&console, a] { backup(console, a->path, a->force); });
 
   command = app.add_subcommand("restore", "put a file's parameters in force, all of them or none");
   command->add_option("FILE", a->path, "as 'backup' writes it")->required();

@@ -11,7 +11,7 @@
 namespace console {
 namespace {
 
-constexpr int scale_width = 8;                                         // characters of the scale at the left
+constexpr int scale_width = 12;  // characters of the scale at the left: "-2000 rad/s"
 constexpr std::array<int, 6> ansi_colours = {36, 33, 35, 32, 31, 34};  // told apart on dark and on light grounds
 
 struct Cell {
@@ -30,31 +30,37 @@ std::string utf8(unsigned code) {
           static_cast<char>(0x80 | (code & 0x3F))};
 }
 
-struct Range {
-  float low = std::numeric_limits<float>::infinity(), high = -low;
-};
-
-Range range_of(const std::vector<PlotLine>& lines, std::size_t columns, float least_span) {
-  Range range;
+/// Until it holds all values, then outwards to round numbers: 1, 2 or 5 times a power of ten.
+void grow(Scale& scale, const std::vector<PlotLine>& lines, std::size_t columns) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const PlotLine& line : lines) {
     const std::size_t first = line.values.size() - std::min(columns, line.values.size());
     for (std::size_t i = first; i < line.values.size(); ++i) {
       if (!std::isfinite(line.values[i])) continue;
-      range.low = std::min(range.low, line.values[i]);
-      range.high = std::max(range.high, line.values[i]);
+      low = std::min(low, double{line.values[i]});
+      high = std::max(high, double{line.values[i]});
     }
   }
-  if (range.low > range.high) return {0, least_span};
-  const float lacking = std::max(0.0f, least_span - (range.high - range.low)) / 2;  // huge spans lack nothing
-  return {range.low - lacking, range.high + lacking};
+  const bool begun = scale.low < scale.high;
+  if (low > high || (begun && low >= scale.low && high <= scale.high)) return;
+  if (begun) low = std::min(low, scale.low), high = std::max(high, scale.high);
+  // Four digits are shown, so both ends shall differ in them.
+  const double least = std::max(scale.least_span, 1e-3 * std::max(std::abs(low), std::abs(high)));
+  const double lacking = std::max(0.0, least - (high - low)) / 2;
+  low -= lacking, high += lacking;
+  const double fifth = (high - low) / 5, power = std::pow(10, std::floor(std::log10(fifth)));
+  const double step = power * (fifth <= power ? 1 : fifth <= 2 * power ? 2 : fifth <= 5 * power ? 5 : 10);
+  scale.low = step * std::floor(low / step);
+  scale.high = step * std::ceil(high / step);
 }
 
 }  // namespace
 
-std::string plot(const std::vector<PlotLine>& lines, int width, int height, float least_span, bool colours) {
+std::string plot(const std::vector<PlotLine>& lines, Scale& scale, int width, int height, bool colours) {
   const int cells = std::max(10, width - scale_width - 1), rows = std::max(2, height);
   const auto columns = static_cast<std::size_t>(2 * cells);
-  const Range range = range_of(lines, columns, least_span);
+  grow(scale, lines, columns);
+  const double low = scale.low, high = low < scale.high ? scale.high : low + scale.least_span;
   std::vector<Cell> grid(static_cast<std::size_t>(cells * rows));
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const auto& values = lines[l].values;
@@ -66,7 +72,7 @@ std::string plot(const std::vector<PlotLine>& lines, int width, int height, floa
         last_y = -1;
         continue;
       }
-      const double share = (double{range.high} - double{value}) / (double{range.high} - double{range.low});
+      const double share = (high - double{value}) / (high - low);
       const int y = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * (4 * rows - 1)));
       const int x = static_cast<int>(columns - shown + i);
       // A steep curve stays connected: the dots between it and its last column are drawn as well.
@@ -82,10 +88,10 @@ std::string plot(const std::vector<PlotLine>& lines, int width, int height, floa
   }
   std::string text;
   for (int row = 0; row < rows; ++row) {
-    std::string scale;
-    if (row == 0) scale = fmt::format("{:.4g}", range.high);
-    if (row == rows - 1) scale = fmt::format("{:.4g}", range.low);
-    text += fmt::format("{:>{}} ", scale, scale_width);
+    std::string end;
+    if (row == 0) end = fmt::format("{:.4g} {}", high, scale.unit);
+    if (row == rows - 1) end = fmt::format("{:.4g} {}", low, scale.unit);
+    text += fmt::format("{:>{}} ", end, scale_width);
     int colour = 0;
     for (int c = 0; c < cells; ++c) {
       const Cell& cell = grid[static_cast<std::size_t>(row * cells + c)];

@@ -9,12 +9,19 @@
 namespace console {
 
 struct PlotLine {
-  std::string label;          // "core 41.3 degC"
+  std::string label;          // name, newest value, unit: "core 41.3 degC"
   std::vector<float> values;  // oldest first, one per column of dots; NaN leaves a gap
 };
 
+/// What the scale at the left shows. It only grows, so that a live curve does not jump, and ends at round numbers.
+struct Scale {
+  std::string unit;
+  double least_span;
+  double low = 0, high = 0;  // equal: nothing was drawn yet
+};
+
 /// `height` lines of text and one of labels, each `width` characters wide at most, each ended by a line feed. The
-/// newest value stands at the right edge; older values than fit are left out. `least_span`: the scale never shows less.
-std::string plot(const std::vector<PlotLine>& lines, int width, int height, float least_span, bool colours);
+/// newest value stands at the right edge; older values than fit are left out.
+std::string plot(const std::vector<PlotLine>& lines, Scale& scale, int width, int height, bool colours);
 
 }  // namespace console

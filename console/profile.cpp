@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <sstream>
@@ -52,7 +53,9 @@ const char* unit_of(wire::ControlMode mode) { return mode == wire::ControlMode::
 std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
   using wire::pc::Exit, wire::pc::UserError;
   std::vector<Piece> pieces;
-  std::stringstream stream(text);
+  std::string commas = text;
+  std::replace(commas.begin(), commas.end(), ';', ',');
+  std::stringstream stream(commas);
   for (std::string part; std::getline(stream, part, ',');) {
     Piece piece{};
     std::string_view rest = part;
@@ -62,7 +65,7 @@ std::vector<Piece> profile_in(const std::string& text, std::size_t most) {
       piece.mode = wire::ControlMode::torque;
     }
     read = read && quantity(rest, second_units, piece.seconds);
-    if (!read || rest.find_first_not_of(' ') != std::string_view::npos || !(piece.seconds > 0)) {
+    if (!read || rest.find_first_not_of(" \t") != std::string_view::npos || !(piece.seconds > 0)) {
       wire::pc::refuse(fmt::format(
           "'{}' is no piece of a course; write amperes (or Nm) and seconds, such as \"20A 0.3s, 6A 5s\".", part));
     }

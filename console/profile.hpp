@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A course as a person writes it: "20A 0.3s, 6A 5s, -2.5A 200ms", or of torque: "50mNm 0.3s, 0Nm 1s". A bare number is
-// amperes, then seconds.
+// A course as a person writes it: "20A 0.3s, 6A 5s, -2.5 A 200 ms", or of torque: "50mNm 0.3s; 0Nm 1s". A bare number
+// is amperes, then seconds.
 #pragma once
 
 #include <string>

@@ -17,7 +17,9 @@ std::vector<std::string> columns_of(const std::vector<Target>& signals) {
 
 Recorder::Recorder(Session& session, const std::string& path, const std::string& what,
                    const std::vector<Target>& signals, double rate_Hz)
-    : session_(session), file_(path, preamble(session, what), columns_of(signals)), time_(session.hello().pwm_Hz) {
+    : session_(session),
+      file_(path, preamble(session, what, signals), columns_of(signals)),
+      time_(session.hello().pwm_Hz) {
   const double pwm_Hz = session.hello().pwm_Hz;
   const double decimation = std::clamp(std::round(pwm_Hz / rate_Hz), 1.0, 65535.0);
   rate_Hz_ = pwm_Hz / decimation;

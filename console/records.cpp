@@ -10,6 +10,7 @@
 #include "console/live.hpp"
 #include "console/plot.hpp"
 #include "console/recorder.hpp"
+#include "wire/pc/files.hpp"
 
 namespace console {
 namespace {
@@ -47,6 +48,8 @@ std::vector<Target> signals_named(Console& console, const std::vector<std::strin
   return targets;
 }
 
+constexpr double least_span = 1e-3;  // of a scale; a steady signal is a line, not its last digit
+
 /// Chosen signals as curves, one plot a unit.
 class Curves {
  public:
@@ -59,14 +62,17 @@ class Curves {
     }
   }
 
-  std::string drawn(int width, int height, bool colours) const {
+  std::string drawn(int width, int height, bool colours) {
     std::map<std::string, std::vector<PlotLine>> by_unit;
     for (std::size_t s = 0; s < signals_.size(); ++s) {
       const float last = trails_[s].empty() ? std::nanf("") : trails_[s].back();
       by_unit[signals_[s].what->unit].push_back({fmt::format("{} {:.4g}", full_name(signals_[s]), last), trails_[s]});
     }
     std::string text;
-    for (const auto& [unit, lines] : by_unit) text += plot(lines, width, height, 1e-3f, colours);
+    for (const auto& [unit, lines] : by_unit) {
+      Scale& scale = scales_.try_emplace(unit, Scale{unit, least_span}).first->second;
+      text += plot(lines, scale, width, height, colours);
+    }
     return text;
   }
 
@@ -80,6 +86,7 @@ class Curves {
  private:
   std::vector<Target> signals_;
   std::vector<std::vector<float>> trails_;
+  std::map<std::string, Scale> scales_;  // by unit
 };
 
 /// Chosen signals, by telemetry.
@@ -127,7 +134,8 @@ void watch(Console& console, const std::vector<std::string>& names, const std::s
 }
 
 void log(Console& console, const std::vector<std::string>& names, const std::string& axis, const std::string& path,
-         double rate_Hz, double seconds) {
+         bool force, double rate_Hz, double seconds) {
+  wire::pc::need_new_file(path, force);
   Session& session = console.session();
   const int index = axis == "1" ? 1 : 0;
   const std::vector<Target> signals =
@@ -155,11 +163,13 @@ void log(Console& console, const std::vector<std::string>& names, const std::str
 struct CaptureArguments {
   std::vector<std::string> names;
   std::string trigger, edge = "now", path = "capture.csv";
+  bool force = false;
   float level = 0;
   std::uint16_t pre = 100, post = 400, decimation = 1;
 };
 
 void capture(Console& console, const CaptureArguments& a) {
+  wire::pc::need_new_file(a.path, a.force);
   Session& session = console.session();
   const std::vector<Target> signals = signals_named(console, a.names);
   static const std::map<std::string, wire::Edge> edges = {
@@ -183,7 +193,8 @@ void capture(Console& console, const CaptureArguments& a) {
   }
   std::vector<std::string> columns;
   for (const Target& signal : signals) columns.push_back(full_name(signal));
-  const std::string head = preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level));
+  const std::string head =
+      preamble(session, fmt::format("capture, time 0 is the trigger ({} {:g})", a.edge, a.level), signals);
   session.capture(order, signals);
   wire::CaptureStatus status = session.capture_status();
   if (status.phase == wire::CapturePhase::waiting) console.tell("Waiting for the trigger; Ctrl-C gives up.");
@@ -220,7 +231,8 @@ void capture(Console& console, const CaptureArguments& a) {
   std::string text;
   for (std::size_t s = 0; s < lines.size(); ++s) {
     lines[s].label = columns[s];
-    text += plot({lines[s]}, terminal_width(), 6, 1e-3f, on_terminal());
+    Scale scale{signals[s].what->unit, least_span};
+    text += plot({lines[s]}, scale, terminal_width(), 6, on_terminal());
   }
   text += fmt::format("Written: {} ({} rows, {} of them before the trigger; the picture shows the last ones).\n",
                       a.path, status.rows, status.pre);
@@ -234,7 +246,7 @@ void add_records(CLI::App& app, Console& console) {
     std::vector<std::string> names;
     std::string axis = "both", path;
     double rate_Hz = 20, seconds = longest_s;
-    bool names_only = false;
+    bool names_only = false, force = false;
   };
   auto s = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("signals", "what can be watched, logged and captured");
@@ -257,13 +269,16 @@ void add_records(CLI::App& app, Console& console) {
   l->axis = "0", l->rate_Hz = 100;
   command = app.add_subcommand("log", "write telemetry of one axis to a file that 'identify' reads as it is");
   command->add_option("SIGNAL", l->names, "signals; without any, what identify needs and what the board estimates");
-  command->add_option("--out", l->path, "a .csv file")->required();
+  command
+      ->add_option("--out", l->path, "a new .csv file; what the codes of mode, limit and fault mean stands at its top")
+      ->required();
   command->add_option("--axis", l->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   command->add_option("--rate", l->rate_Hz, "rows a second, at most the PWM frequency")
       ->capture_default_str()
       ->check(between(0.5, 1e6));
   command->add_option("--seconds", l->seconds, "end by itself after so long")->check(between(0, longest_s));
-  command->callback([&console, l] { log(console, l->names, l->axis, l->path, l->rate_Hz, l->seconds); });
+  command->add_flag("--force", l->force, "write over a file that is there");
+  command->callback([&console, l] { log(console, l->names, l->axis, l->path, l->force, l->rate_Hz, l->seconds); });
 
   auto c = std::make_shared<CaptureArguments>();
   command = app.add_subcommand("capture", "a short stretch at full PWM rate, from before to after a trigger");
@@ -278,7 +293,8 @@ void add_records(CLI::App& app, Console& console) {
   command->add_option("--decimation", c->decimation, "PWM periods a row")
       ->capture_default_str()
       ->check(between(1, 65535));
-  command->add_option("--out", c->path, "a .csv file")->capture_default_str();
+  command->add_option("--out", c->path, "a new .csv file")->capture_default_str();
+  command->add_flag("--force", c->force, "write over a file that is there");
   command->callback([&console, c] { capture(console, *c); });
 }
 

@@ -221,9 +221,9 @@ wire::Offsets Session::calibrate(int axis) {
   return asked<wire::Offsets>(Kind::calibrate, bytes_of(axes), fmt::format("calibrate axis {}", axis), slow_s);
 }
 
-wire::Outlook Session::ask(int axis, std::span<const wire::Segment> segments) {
+wire::Outlook Session::ask(int axis, std::span<const wire::Segment> segments, bool standing) {
   Payload payload;
-  payload.add(wire::Ask{static_cast<std::uint8_t>(axis)});
+  payload.add(wire::Ask{static_cast<std::uint8_t>(axis), static_cast<std::uint8_t>(standing ? 1 : 0)});
   for (const wire::Segment& segment : segments) payload.add(segment);
   return asked<wire::Outlook>(Kind::ask, payload, "look ahead", slow_s);
 }

@@ -48,7 +48,8 @@ class Session {
   wire::State state();
   wire::FaultEvidence fault(int axis);
   wire::Offsets calibrate(int axis);
-  wire::Outlook ask(int axis, std::span<const wire::Segment> segments);
+  /// `standing`: each phase as if it were the hottest, wherever the rotor stands; else all phases share the heat.
+  wire::Outlook ask(int axis, std::span<const wire::Segment> segments, bool standing);
 
   /// From now on each telemetry frame goes to `taker`, whatever else is asked or waited for meanwhile.
   void subscribe(const std::vector<Target>& signals, std::uint16_t decimation,

@@ -74,7 +74,9 @@ int each(const std::string& path, const toml::table& file, const char* name, int
 }  // namespace
 
 HeatModel read_heat_model(const std::string& path) {
-  const toml::table file = wire::pc::parse_toml(wire::pc::find_toml("heat model", path, "."));
+  const std::string found = wire::pc::find_toml("heat model", path, ".");
+  const toml::table file = wire::pc::parse_toml(found);
+  wire::pc::need_kind("heat model", found, file);
   known_keys(path, file, {"format", "motor", "node", "link", "source", "housing_sensor", "trust", "recording"});
   if (file["format"].value_or(0) != 1) refuse(path + ": format must be 1; write the model again with this identify.");
 

@@ -67,6 +67,7 @@ Scene scene_of(const RecordOptions& options) {
 /// The experiment that identify advises, from its answer. Currents are direct ones, as in the log.
 std::vector<host_sim::Demand> advised(const std::string& path) {
   using wire::pc::Exit, wire::pc::UserError;
+  if (path.empty()) wire::pc::refuse("record profile needs --profile FILE; identify --json writes such a file.");
   std::ifstream in(path);
   if (!in) wire::pc::refuse(fmt::format("--profile {}: there is no such file; identify --json writes one.", path));
   const nlohmann::json answer = nlohmann::json::parse(in, nullptr, false);

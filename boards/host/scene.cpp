@@ -217,6 +217,7 @@ std::vector<std::string> scene_names(const std::string& folder) { return wire::p
 Scene read_scene(const std::string& which, const std::string& folder, const std::vector<std::string>& overrides) {
   const std::string path = wire::pc::find_toml("scene", which, folder);
   const toml::table table = wire::pc::parse_toml(path);
+  wire::pc::need_kind("scene", path, table);
   Reader reader;
   reader.scene.id = fs::path(path).stem().string();
   reader.scene.title = reader.scene.id;

@@ -80,6 +80,7 @@ struct Excerpt {
   const char* scene;
   std::vector<std::string> overrides;
   double estimated_core_K, true_core_K;
+  friend void PrintTo(const Excerpt& excerpt, std::ostream* out) { *out << excerpt.scene; }  // else ctest lists bytes
 };
 
 class Agreement : public testing::TestWithParam<Excerpt> {};

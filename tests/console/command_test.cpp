@@ -124,6 +124,8 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   EXPECT_EQ(summary["peak_A"], 5.0);
   EXPECT_NEAR(board_->setpoints, 60, 4);  // 200 a second
   EXPECT_EQ(board_->armed, 0);
+  EXPECT_NEAR(json("run \"5A 0.2s, 0A 0.1s\" --times 3")["seconds"], 0.9, 0.02);
+  refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
 TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
@@ -135,8 +137,11 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   EXPECT_EQ(json("run \"50mNm 0.1s, 0Nm 0.1s\" --axis 1")["peak_A"].get<float>(),
             0.05f);  // the script's board: as asked
   EXPECT_EQ(say("arm --torque 0.2 --seconds 0.1 --axis 1").code, 0);
-  refused("run \"20A 1s\" --axis 1", 8, "Axis 1 refused the setpoint 20 A: the setpoint has another unit");
-  refused("run \"1Nm 1s\"", 8, "Axis 0 refused the setpoint 1 N m: the setpoint has another unit");
+  refused("run \"20A 1s\" --axis 1", 8,
+          "Axis 1 is in torque mode and takes no A; a board of --sim is gone with its process, so say "
+          "'mode current --axis 1' at the prompt of 'hotcore --sim', then this.");
+  refused("run \"1Nm 1s\"", 8, "Axis 0 is in current mode and takes no N m");
+  refused("arm --torque 0.01 --axis both", 8, "'mode torque --axis 0'");
   EXPECT_EQ(board_->armed, 0);
   board_->armed = 2;
   refused("mode current", 8, "refused to put both axes in current mode: axis 0: the axis is armed");
@@ -144,6 +149,25 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   refused("run \"1A 1s, 1Nm 1s\"", 2, "has another unit than the pieces before it");
   refused("ask \"1Nm 1s\"", 2, "takes amperes");
   refused("arm --iq 1 --torque 1", 2, "excludes");
+}
+
+TEST_F(Commands, ArmedIsSaidOnceItIs) {
+  EXPECT_EQ(say("arm --iq 2 --seconds 0.1").err, "Armed at 2 A; Ctrl-C disarms.\n");
+  refused("arm --iq 1e9", 8, "Axis 0 refused the setpoint 1e+09 A: the setpoint is not a number or beyond any board");
+  board_->fault = static_cast<std::uint8_t>(wire::Fault::over_current);
+  refused("arm --iq 2", 8, "refused to arm axis 0: the axis has tripped");
+  EXPECT_EQ(board_->armed, 0);
+}
+
+TEST_F(Commands, AWrongModeIsToldWithTheCommandThatHelps) {
+  EXPECT_EQ(say("mode").code, 0);  // there is a board now, and from here on it counts as a real one
+  console_.options.sim = false;
+  testing::internal::CaptureStderr();
+  const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("arm --torque 0.01 --axis 1"); });
+  EXPECT_EQ(code, 8);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "Axis 1 is in current mode and takes no N m; say 'hotcore mode torque --axis 1' first.\n");
+  EXPECT_EQ(board_->armed, 0);
 }
 
 TEST_F(Commands, AFaultIsClearedInEitherMode) {
@@ -181,6 +205,26 @@ TEST_F(Commands, AskSaysWhatWouldHappen) {
   EXPECT_NE(say("ask \"20A 0.3s\"").out.find("after 0.21 s"), std::string::npos);
 }
 
+TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
+  const Said said = say("ask \"20A 0.3s\"");
+  EXPECT_EQ(said.out,
+            "Not in full where the rotor stands; --turning answers for one that turns.\n"
+            "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of the "
+            "ampere-seconds; from there on "
+            "less is delivered (unlimited, the winding would reach 171 degC).\n"
+            "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC.\n");
+  const auto outlook = json("ask \"20A 0.3s\"");
+  EXPECT_EQ(outlook["assumed"], "standing");
+  EXPECT_FALSE(outlook["standing"]["feasible"]);
+  EXPECT_TRUE(outlook["turning"]["feasible"]);
+  EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Yes, as long as it turns."), 0u);
+  EXPECT_TRUE(json("ask \"20A 0.3s\" --turning")["feasible"]);
+  std::swap(board_->standing, board_->turning);  // no board should say so; then the colder answer is not taken
+  EXPECT_FALSE(json("ask \"20A 0.3s\"")["feasible"]);
+  board_->standing = board_->turning;
+  EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Not in full, standing or turning."), 0u);
+}
+
 TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }
 
 TEST_F(Commands, WatchGivesALineForEachState) {
@@ -195,9 +239,16 @@ TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
   EXPECT_NEAR(said["rows"], 101, 1);
   const std::string text = content(path("x.csv"));
   EXPECT_NE(text.find("# board: fake FAKE01\n# firmware: 0.1\n# parameters: "), std::string::npos) << text;
-  EXPECT_NE(text.find("\ntime_s,id_A,iq_A,speed_rad_per_s,bus_V,housing_degC,core_a_degC\n"), std::string::npos)
+  EXPECT_NE(text.find("\ntime_s,id_A,iq_A,speed_rad_per_s,bus_V,housing_degC,core_a_degC,mode,limit\n"),
+            std::string::npos)
       << text;
-  EXPECT_NE(text.find("\n0.020000,21,22,36,34,91,85\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n0.020000,21,22,36,34,91,85,37,38\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n# mode: 0 off, 1 ready, 2 running, 3 tripped\n# limit: 0 none, 97 hardware, 98 core_hot, "),
+            std::string::npos)
+      << text;
+  const std::string limits = text.substr(text.find("# limit:"), text.find("time_s,") - text.find("# limit:"));
+  EXPECT_NE(limits.find(", 106 thermal_late\n"), std::string::npos) << limits;  // and no fault or status among them
+  EXPECT_EQ(limits.find("over_current"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path("x.csv.part")));
 }
 
@@ -285,6 +336,32 @@ TEST_F(Commands, AnAnswerThatComesTooLateIsNotTakenForTheNext) {
   EXPECT_EQ(session.state().axis[0].core_degC, 99.0f);
 }
 
+TEST_F(Commands, AFileThatIsThereStaysUnlessForceIsSaid) {
+  const auto old = [&](const std::string& name) { std::ofstream(path(name)) << "old"; };
+  const std::string to_log = "log --seconds 0.1 --out ", to_capture = "capture axis0.iq_A --out ";
+  for (const std::string& line : {to_log + path("x.csv"), to_capture + path("c.csv"), "backup " + path("b.toml")}) {
+    const std::string name = line.substr(line.rfind('/') + 1);
+    old(name);
+    refused(line, 2, name + ": there is such a file already; choose another name, or say --force to write over it.");
+    EXPECT_EQ(content(path(name)), "old");
+    EXPECT_EQ(say(line + " --force").code, 0);
+    EXPECT_GT(content(path(name)).size(), 10u);
+  }
+  std::filesystem::create_directories(path("i"));
+  old("i/log.csv");
+  refused("identify --out " + path("i"), 2, "i/log.csv: there is such a file already");
+  EXPECT_EQ(content(path("i/log.csv")), "old");
+}
+
+TEST_F(Commands, AFolderThatIsMissingIsToldAndNotMade) {
+  for (const std::string line : {"log --seconds 0.1 --out ", "capture axis0.iq_A --out ", "backup "}) {
+    refused(line + path("no/x"), 2, "no/x: there is no folder " + path("no") + "; make it, or choose another place.");
+    refused(line + folder_.string(), 2, "this is a folder");
+  }
+  EXPECT_TRUE(is_empty());
+  EXPECT_EQ(board_->setpoints, 0);
+}
+
 TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
   int gets = 0;
   board_->before = [&](Kind kind) { return kind != Kind::get || !(board_->unplugged = ++gets == 1); };
@@ -295,7 +372,7 @@ TEST_F(Commands, ABoardThatGoesAwayDuringBackupLeavesNoFile) {
 TEST_F(Commands, ABackupKeepsTheOldFileWhenItFails) {
   std::ofstream(path("mine.toml")) << "old";
   board_->before = [&](Kind kind) { return kind != Kind::get; };
-  refused("backup " + path("mine.toml"), 7, "no answer");
+  refused("backup --force " + path("mine.toml"), 7, "no answer");
   EXPECT_EQ(content(path("mine.toml")), "old");
 }
 
@@ -407,7 +484,7 @@ TEST_F(Commands, WrongCommandLinesGetOneSentence) {
   refused("arm --axis 2", 2, "--axis");
   refused("set current_limit_A", 2, "write name=value");
   refused("capture axis0.iq_A --pre 2000 --post 2000", 2, "at most 1024 rows");
-  refused("log --out /proc/nowhere/x.csv --seconds 1", 2, "cannot be written");
+  refused("log --out /proc/x.csv --seconds 1", 2, "cannot be written");
   refused("captre iq_A", 2, "There is no command 'captre', did you mean 'capture'?");
   refused("stop now", 2, "'now' was not expected");
   refused("get --bogus", 2, "'--bogus' was not expected");
@@ -449,17 +526,55 @@ TEST(Profile, UnitsAreUnderstood) {
   EXPECT_FLOAT_EQ(pieces[2].seconds, 120.0f);
 }
 
+TEST(Profile, BlanksAndSemicolonsAreTakenAsAPersonWritesThem) {
+  const auto pieces = console::profile_in(" 20 A 0.3 s; 6A 5s ,\t-1.5 A  20 ms \t;", 10);
+  ASSERT_EQ(pieces.size(), 3u);
+  EXPECT_FLOAT_EQ(pieces[0].level, 20.0f);
+  EXPECT_FLOAT_EQ(pieces[0].seconds, 0.3f);
+  EXPECT_FLOAT_EQ(pieces[1].seconds, 5.0f);
+  EXPECT_FLOAT_EQ(pieces[2].level, -1.5f);
+  const auto torque = console::profile_in("50 mNm 0.3 s; 0 Nm 1 s", 10);
+  EXPECT_EQ(torque.front().mode, wire::ControlMode::torque);
+  EXPECT_FLOAT_EQ(torque.front().level, 0.05f);
+  for (const char* wrong : {"", ";", "5A 1s;;5A 1s", "5A: 1s", "5 5 5", "A 1s"})
+    EXPECT_THROW((void)console::profile_in(wrong, 10), wire::pc::UserError) << wrong;
+}
+
 TEST(Plot, AStepIsConnectedAndStaysInsideItsFrame) {
-  const std::string text = console::plot({{"x", {0, 0, 0, 8, 8, 8}}}, 20, 2, 1.0f, false);
+  console::Scale scale{"A", 1};
+  const std::string text = console::plot({{"x", {0, 0, 0, 8, 8, 8}}}, scale, 24, 2, false);
   EXPECT_EQ(text,
-            "       8          \u28B8\u2809\n"
-            "       0         \u28C0\u2878 \n"
-            "         x\n")
+            "         8 A          \u28B8\u2809\n"
+            "         0 A         \u28C0\u2878 \n"
+            "             x\n")
       << text;
   const float huge = std::numeric_limits<float>::max();
-  for (const std::vector<float>& values : {std::vector<float>{huge, -huge, std::nanf(""), INFINITY}, {}, {0.0f}}) {
-    const std::string shown = console::plot({{"x", values}}, 20, 3, 1.0f, false);
+  for (const std::vector<float>& values :
+       {std::vector<float>{huge, -huge, std::nanf(""), INFINITY}, {}, {0.0f}, {huge}, {1e-30f}}) {
+    console::Scale fresh{"A", 1e-3};
+    const std::string shown = console::plot({{"x", values}}, fresh, 20, 3, false);
     EXPECT_EQ(std::count(shown.begin(), shown.end(), '\n'), 4) << shown;
+    EXPECT_TRUE(std::isfinite(fresh.low) && std::isfinite(fresh.high));
+  }
+}
+
+TEST(Plot, TheScaleHasItsUnitEndsAtRoundNumbersAndOnlyGrows) {
+  console::Scale scale{"degC", 10};
+  const auto first_line = [&](const std::vector<float>& values) {
+    const std::string text = console::plot({{"core", values}}, scale, 40, 4, false);
+    return text.substr(0, text.find("C ") + 1);
+  };
+  EXPECT_EQ(first_line({29.28f}), "     36 degC");
+  EXPECT_EQ(scale.low, 24);
+  EXPECT_EQ(first_line({29.1f}), "     36 degC");  // inside: as it was
+  EXPECT_EQ(first_line({38.4f}), "     40 degC");
+  EXPECT_EQ(scale.low, 20);
+  double low = scale.low, high = scale.high;
+  for (float value = 30; value < 200; value += value * 0.05f) {
+    (void)first_line({value, 60 - value});
+    EXPECT_TRUE(scale.low <= low && scale.high >= high) << value;
+    EXPECT_TRUE(scale.low <= double{60 - value} && scale.high >= double{value}) << value;
+    low = scale.low, high = scale.high;
   }
 }
 

@@ -35,9 +35,9 @@ struct FakeBoard {
       {0x0105, "pole_pairs", "count", "whole number", 1.0f, 50.0f, 1.0f, wire::whole_number},
       {0x0111, "current_limit", "A", "amplitude", 0.0f, 100.0f, 20.0f},
       {0x0201, "fan_delay", "s", "of the whole board", 0.0f, 60.0f, 5.0f, 0, 1}};
-  std::vector<Signal> signals = {{0x01, "id", "A"},        {0x02, "iq", "A"},
-                                 {0x0E, "bus", "V"},       {0x10, "speed", "rad/s"},
-                                 {0x41, "core_a", "degC"}, {0x47, "housing_measured", "degC"}};
+  std::vector<Signal> signals = {{0x01, "id", "A"},        {0x02, "iq", "A"},        {0x0E, "bus", "V"},
+                                 {0x10, "speed", "rad/s"}, {0x41, "core_a", "degC"}, {0x47, "housing_measured", "degC"},
+                                 {0x11, "mode", ""},       {0x12, "limit", ""}};
 
   // What a test looks at or bends.
   std::uint16_t protocol = wire::protocol_version;
@@ -49,6 +49,7 @@ struct FakeBoard {
   std::uint8_t fault = 0;
   float temperature_degC = 30.0f;
   wire::FaultEvidence evidence{};
+  wire::Outlook standing{{}, 0, {}, 171.0f, 0.21f, 0.8f}, turning{{}, 1, {}, 98.0f, INFINITY, 1.0f};
   /// Sees each request before it is answered; false: no answer comes.
   std::function<bool(wire::Kind)> before = [](wire::Kind) { return true; };
   /// May change an answer's payload before it is framed.
@@ -242,6 +243,8 @@ struct FakeBoard {
           if ((asked.mask >> a & 1) == 0) continue;
           if (asked.mode[a] != control[a])
             refused_[a] = static_cast<std::uint8_t>(wire::Status::other_mode);
+          else if (!(std::abs(asked.q[a]) < 1000.0f))
+            refused_[a] = static_cast<std::uint8_t>(wire::Status::not_a_current);
           else
             asked_A_[a] = asked.q[a];
         }
@@ -259,7 +262,7 @@ struct FakeBoard {
         add(payload, wire::Offsets{{}, {0.01f, -0.02f, 0.03f}});
         break;
       case wire::Kind::ask:
-        add(payload, wire::Outlook{{}, 0, {}, 171.0f, 0.21f, 0.8f});
+        add(payload, frame.payload[1] != 0 ? standing : turning);
         break;
       case wire::Kind::subscribe:
         watched_ = list<wire::SignalAddress>(frame, sizeof(wire::Subscribe));

@@ -60,7 +60,7 @@ std::vector<std::vector<std::uint8_t>> honest_answers() {
   (void)session.fault(0);
   (void)session.calibrate(0);
   const wire::Segment segment{1.0f, 1.0f};
-  (void)session.ask(0, std::span(&segment, 1));
+  (void)session.ask(0, std::span(&segment, 1), true);
   session.capture({{}, wire::Edge::now, 0, 0, 5, 5, 1}, session.signals().all());
   (void)session.capture_status();
   std::vector<float> values;

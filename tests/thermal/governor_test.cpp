@@ -237,7 +237,8 @@ TEST(Governor, ASheetsUncertaintyCostsCapacityButNeitherSlopeNorLimit) {
   };
   for (const Case& c : {Case{thermal::sheet_trust, 1, 1, 1, 0.80}, Case{thermal::sheet_trust, 1.3, 1, 1, 0},
                         Case{thermal::sheet_trust, 1, 0.7, 1, 0}, Case{thermal::sheet_trust, 1, 1, 1.2, 0},
-                        Case{thermal::sheet_trust, 1.3, 0.8, 1, 0}, Case{thermal::identified_trust, 1, 1, 1, 0.95}}) {
+                        Case{thermal::sheet_trust, 1.3, 0.8, 1, 0}, Case{thermal::identified_trust, 1, 1, 1, 0.95},
+                        Case{thermal::exact_trust, 1, 1, 1, 0.99}}) {
     thermal::EstimatorSettings es;
     es.trust = c.trust;
     Loop loop(reference::ec16(), 20, 25, es);

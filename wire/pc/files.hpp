@@ -38,4 +38,18 @@ inline void write_whole(const std::string& path, const std::string& text) {
   }
 }
 
+/// Before work whose result goes into a file: its folder must be there, and a file that is there stays unless `force`.
+/// For what cannot be had a second time, such as a log; what a command makes anew it may replace. Throws UserError
+/// (usage).
+inline void need_new_file(const std::string& path, bool force) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, error))
+    refuse(path + ": there is no folder " + folder.string() + "; make it, or choose another place.");
+  if (fs::is_directory(path, error)) refuse(path + ": this is a folder; name a file in it.");
+  if (!force && fs::is_regular_file(path, error))
+    refuse(path + ": there is such a file already; choose another name, or say --force to write over it.");
+}
+
 }  // namespace wire::pc

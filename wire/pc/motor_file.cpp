@@ -71,6 +71,7 @@ std::vector<std::string> motor_names(const std::string& folder) { return toml_na
 MotorFile read_motor(const std::string& which, const std::string& folder) {
   const std::string path = find_toml("motor", which, folder);
   const toml::table table = parse_toml(path);
+  need_kind("motor", path, table);
 
   std::vector<std::string> known;
   for (const Key& key : keys) known.push_back(key.name);

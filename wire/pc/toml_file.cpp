@@ -24,16 +24,42 @@ std::vector<std::string> toml_names(const std::string& folder) {
 }
 
 std::string find_toml(const std::string& kind, const std::string& which, const std::string& folder) {
+  std::error_code none;
+  // What lies in the working folder may be anything.
+  const std::vector<std::string> known = folder == "." ? std::vector<std::string>{} : toml_names(folder);
+  const std::string named = known.empty() ? "" : fmt::format(", or one of: {}", fmt::join(known, ", "));
+  if (fs::is_directory(which, none)) refuse(fmt::format("{}: this is a folder; give a .toml file{}.", which, named));
   if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
-    if (fs::is_regular_file(which)) return which;
+    if (fs::is_regular_file(which, none)) return which;
     refuse(fmt::format("{}: there is no such {} file; check the path.", which, kind));
   }
   const std::string path = folder + "/" + which + ".toml";
-  if (which.find('/') == std::string::npos && fs::is_regular_file(path)) return path;
-  const std::vector<std::string> known = toml_names(folder);
+  const bool is_path = which.find('/') != std::string::npos;
+  if (!is_path && fs::is_regular_file(path, none)) return path;
+  if (fs::exists(which, none))
+    refuse(fmt::format("{}: this is no {} file, those end in .toml; give one{}.", which, kind, named));
   const std::string hint = did_you_mean(which, known);
+  if (is_path || known.empty())
+    refuse(fmt::format("{}: there is no such {}; give a .toml file{}.", which, kind, named));
   refuse(
       fmt::format("Unknown {} '{}'{} There are: {}.", kind, which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
+}
+
+void need_kind(const std::string& kind, const std::string& path, const toml::table& file) {
+  struct Known {
+    const char *kind, *key, *advice;
+  };
+  constexpr Known all[] = {
+      {"heat model", "node", "'host-sim run SCENE --set trust=identified --set model={}' takes it"},
+      {"motor", "terminal_resistance_ohm",
+       "'--motor {0}' of identify and of host-sim record, '--set motor={0}' of "
+       "host-sim run take it"},
+      {"scene", "demand", "'host-sim run {}' takes it"}};
+  for (const Known& other : all) {
+    if (kind == other.kind || !file.contains(other.key)) continue;
+    refuse(fmt::format("{}: this is a {} and no {}; {}.", path, other.kind, kind,
+                       fmt::format(fmt::runtime(other.advice), path)));
+  }
 }
 
 toml::table parse_toml(const std::string& path) {
