@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "identify/report.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -449,7 +450,9 @@ TEST(SlowReport, MassesThatTwoResistorsExchangeAreNotHeldAgainstTheSheet) {
   EXPECT_GT(report.baseline[2].value, 4 * tests::ec_16().motor.C1_J_per_K);
   says(report.sentence, "misses the winding, whose readings are noisy by 1.");
   EXPECT_EQ(identify::as_text(report, false).find("-0.0 "), std::string::npos) << "in the ladder";
-  for (const std::string& note : report.notes) EXPECT_EQ(note.find("times the sheet's"), std::string::npos) << note;
+  const std::string notes = fmt::format("{}", fmt::join(report.notes, " "));
+  EXPECT_EQ(notes.find("C1 comes out"), std::string::npos) << notes;
+  says(notes, "Two resistors alone take C1 for ");
 }
 
 /// As an inverter's logger averages: what flowed in the five seconds before a row, beside a winding of 50 s.

@@ -28,14 +28,14 @@ std::string find_toml(const std::string& kind, const std::string& which, const s
   // What lies in the working folder may be anything.
   const std::vector<std::string> known = folder == "." ? std::vector<std::string>{} : toml_names(folder);
   const std::string named = known.empty() ? "" : fmt::format(", or one of: {}", fmt::join(known, ", "));
-  if (fs::is_directory(which, none)) refuse(fmt::format("{}: this is a folder; give a .toml file{}.", which, named));
   if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
     if (fs::is_regular_file(which, none)) return which;
     refuse(fmt::format("{}: there is no such {} file; check the path.", which, kind));
   }
   const std::string path = folder + "/" + which + ".toml";
   const bool is_path = which.find('/') != std::string::npos;
-  if (!is_path && fs::is_regular_file(path, none)) return path;
+  if (!is_path && fs::is_regular_file(path, none)) return path;  // beside a folder of the same name, which runs leave
+  if (fs::is_directory(which, none)) refuse(fmt::format("{}: this is a folder; give a .toml file{}.", which, named));
   if (fs::exists(which, none))
     refuse(fmt::format("{}: this is no {} file, those end in .toml; give one{}.", which, kind, named));
   const std::string hint = did_you_mean(which, known);
