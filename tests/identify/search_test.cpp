@@ -242,6 +242,26 @@ TEST(SlowSearch, AThirdMassAChangeOfCoolingAndALateSensorGoOnThroughAPause) {
   }
 }
 
+/// A log whose first minutes are lost.
+std::vector<identify::Log> without_its_first(double seconds, std::vector<identify::Log> logs) {
+  const auto rows = static_cast<std::ptrdiff_t>(seconds * 10);
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + rows);
+  }
+  return logs;
+}
+
+TEST(SlowSearch, WhatWentOnBeforeALogIsNoSecondCause) {
+  for (const char* id : {"third_mass", "sensor_lag", "ambient_drift"}) {
+    const Hidden log = hidden({id}, 4242);
+    for (const double seconds : {200, 300, 500}) {
+      const auto found = identify::search(identify::problem_of(without_its_first(seconds, log.logs), log.log.sheet));
+      ASSERT_FALSE(found.tied.empty()) << id << " without " << seconds << " s";
+      EXPECT_EQ(found.tied.front(), std::vector<std::string>{id}) << "without " << seconds << " s";
+    }
+  }
+}
+
 TEST(SlowSearch, WithTheTrueCauseTakenOutOfTheTableNoOtherIsNamedThatDoesNotComeNear) {
   for (const char* id : {"current_offset", "neighbour_heat", "ac_copper_loss"}) {
     const Problem problem = hidden({id}, 4242).problem;
