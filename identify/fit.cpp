@@ -18,12 +18,11 @@ constexpr double initial_room_K = 60, most_excess_K = 150;
 // Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
 // catalogues is 0.03 to 1.4.
 constexpr double warm_excess_share = 0.5;
-// Of a housing that is warm when the log begins, what lags may have followed all of the rise or none of it, evenly
-// likely, the root of whose mean square this is; of one that cools it is ahead. And an ambient may have drifted for as
-// long again.
+// Before a log that begins warm its housing moved by this share of its rise within its time constant: all of it or
+// none, evenly likely, the root of whose mean square this is; three times it under a burst. And an ambient may have
+// drifted for as long again.
 const double before_sd = 1 / std::sqrt(3.0);
-// A late sensor shows a quarter of the rise at least.
-constexpr double least_before[] = {-1, -1, 0}, most_before[] = {1, 3, 1};
+constexpr double least_before[] = {-1, -3, 0}, most_before[] = {1, 3, 1};
 
 // How large a cause is follows Student's t around nothing, the rest Gaussians: fifteen times what is typical is rare,
 // and no reason to believe in two imitations of a typical size. Degrees of freedom: Lange, Little, Taylor, JASA 84
@@ -114,6 +113,7 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   else
     set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
   set.housing = {1, S(0), S(0), S(0)};
+  S mass_s(0);
   int at = base_count;
   for (const Chosen& c : chosen) {
     const Cause& cause = cause_of(c);
@@ -123,13 +123,15 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
       const double scale = problem.scale(parameter.scale, cause.drive);
       k[p] = (parameter.logarithmic ? exp(x[at]) : x[at]) * scale;
     }
+    if (cause.edit == Edit::mass) mass_s = k[0] * k[1];
     apply(cause, k, c, l, m);
   }
-  if (problem.logs[l].begins_warm) {
-    m.mass_behind = before[mass_before];
-    m.sensor_behind = before[sensor_before];
-    m.drifted_s = before[drift_before] * problem.duration_s;
-  }
+  if (!problem.logs[l].begins_warm) return m;
+  // What lags is behind by how the housing moved within its time constant.
+  const S housing_s = exp(x[1] + x[3]);
+  m.mass_behind = before[mass_before] * mass_s / (mass_s + housing_s);
+  m.sensor_behind = before[sensor_before] * set.housing.lag_s / housing_s;
+  m.drifted_s = before[drift_before] * problem.duration_s;
   return m;
 }
 

@@ -15,8 +15,8 @@
 namespace identify {
 
 inline constexpr int base_count = 4, per_start_count = 2;
-/// What went on before a log that begins warm: how far Model::mass_behind and sensor_behind are, and for how much of
-/// Problem::duration_s an ambient drifted.
+/// What went on before a log that begins warm: as how far the housing moved a further mass and a late sensor show it,
+/// in shares of its rise within its time constant; and for how much of Problem::duration_s an ambient drifted.
 enum Before { mass_before, sensor_before, drift_before, before_count };
 
 struct Fit {

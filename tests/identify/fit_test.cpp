@@ -108,7 +108,7 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
                                                 : parameter.none + 0.31 * parameter.typical;
     }
     for (Eigen::Index s = 0; s < starts; ++s) x.segment(own + 2 * s, 2) << 24.5 + 5 * static_cast<double>(s), 0.3;
-    x.tail(before).setConstant(0.2);
+    x.tail(before).setConstant(0.05);
     ASSERT_LT(identify::misfit_at(problem, chosen, x, &gradient), 1e200) << cause.id;
     if (before > 0) {
       using enum identify::Edit;
@@ -453,7 +453,7 @@ TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
   const auto logs = tests::bench_logs({cold, warm});
   const Problem problem = identify::problem_of(logs, sheet);
   const Fit f = identify::fit(problem, {});
-  ASSERT_EQ(f.x.size(), 8);
+  ASSERT_EQ(f.x.size(), 8 + identify::before_count);
   EXPECT_NEAR(f.x[4], 24, 1);
   EXPECT_NEAR(f.x[6], 60, 1);
   const Fit one = identify::fit(identify::problem_of({logs[0]}, sheet), {});
