@@ -316,6 +316,8 @@ void find_starts(Bins& out, const Log& log) {
     if (std::isnan(start.housing_degC))
       start.housing_degC = first_reading(out, &Bin::housing_degC, start.bin, to, 1, out.duration_s());
   }
+  out.begins_warm = std::abs(out.starts.front().housing_degC - out.bins.front().input.boundary_degC[0]) >
+                    soaked_K + out.housing_step_K;
 }
 
 void find_idle(Bins& out) {

@@ -60,8 +60,9 @@ struct Bins {
   bool sink_assumed = false;    // to be as warm as what the log begins at
   bool sink_unwatched = false;  // or as a person said once: how it moved is not known
   bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
-  std::vector<Start> starts = {Start{}};                        // the first at bin 0
-  double housing_noise_K = 0, core_noise_K = 0;                 // of one raw reading, from its differences
+  std::vector<Start> starts = {Start{}};         // the first at bin 0
+  bool begins_warm = false;                      // or cold: the housing at another temperature than the sink
+  double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences
   double missing_share = 0, gap_share = 0, housing_step_K = 0;  // as in Log
   Reference core_reference = {};                                // as in Log
   double uneven_per_A2 = 0;                                     // as in Problem

@@ -105,7 +105,6 @@ void read_torque(Log& log, const std::optional<wire::Motor>& motor) {
 }
 
 void read_resistance(Log& log) {
-  constexpr double soaked_K = 1;  // two sensors beside each other differ by as much
   if (!log.has(Role::winding_ohm) || log.has(Role::core)) return;
   std::vector<double>& ohm = log.of(Role::winding_ohm);
   int nothing = 0;

@@ -18,6 +18,11 @@ constexpr double initial_room_K = 60, most_excess_K = 150;
 // Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
 // catalogues is 0.03 to 1.4.
 constexpr double warm_excess_share = 0.5;
+// Before a log that begins warm its housing moved by this share of its rise within its time constant: all of it or
+// none, evenly likely, the root of whose mean square this is; three times it under a burst. And an ambient may have
+// drifted for as long again.
+const double before_sd = 1 / std::sqrt(3.0);
+constexpr double least_before[] = {-1, -3, 0}, most_before[] = {1, 3, 1};
 
 // How large a cause is follows Student's t around nothing, the rest Gaussians: fifteen times what is typical is rare,
 // and no reason to believe in two imitations of a typical size. Degrees of freedom: Lange, Little, Taylor, JASA 84
@@ -30,7 +35,20 @@ struct Coordinate {
 };
 
 /// Initial coordinates of a log.
-Eigen::Index own_count(const Bins& log) { return per_start_count * static_cast<Eigen::Index>(log.starts.size()); }
+Eigen::Index own_count(const Bins& log) {
+  return per_start_count * static_cast<Eigen::Index>(log.starts.size()) + (log.begins_warm ? before_count : 0);
+}
+
+/// What of the causes depends on what was before a log.
+std::vector<Before> before_of(const std::vector<Chosen>& chosen) {
+  std::vector<Before> out;
+  for (const Chosen& c : chosen) {
+    if (cause_of(c).edit == Edit::mass) out.push_back(mass_before);
+    if (cause_of(c).edit == Edit::sensor_lag) out.push_back(sensor_before);
+    if (cause_of(c).edit == Edit::drift) out.push_back(drift_before);
+  }
+  return out;
+}
 
 int coordinates_of(const std::vector<Chosen>& chosen) {
   int n = 0;
@@ -67,13 +85,18 @@ std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>
           std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
       out.push_back({excess, excess, initial_sd_K + excess_sd_K, -initial_room_K, most_excess_K});
     }
+    const std::vector<Before> before = before_of(chosen);
+    for (int i = 0; log.begins_warm && i < before_count; ++i) {
+      const bool counts = std::find(before.begin(), before.end(), i) != before.end();
+      out.push_back({0, 0, before_sd, counts ? least_before[i] : 0, counts ? most_before[i] : 0});
+    }
   }
   return out;
 }
 
-/// What simulates log `l` at coordinates x; local directions: base, causes, then the two of a start.
+/// What simulates log `l` at coordinates x of base and causes; `before`: of what was before it, where it begins warm.
 template <class S>
-Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, std::size_t l) {
+Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, const S* before, std::size_t l) {
   using std::exp;
   const Belief& belief = problem.belief;
   Model<S> m;
@@ -90,6 +113,7 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
   else
     set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
   set.housing = {1, S(0), S(0), S(0)};
+  S mass_s(0);
   int at = base_count;
   for (const Chosen& c : chosen) {
     const Cause& cause = cause_of(c);
@@ -99,8 +123,15 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
       const double scale = problem.scale(parameter.scale, cause.drive);
       k[p] = (parameter.logarithmic ? exp(x[at]) : x[at]) * scale;
     }
+    if (cause.edit == Edit::mass) mass_s = k[0] * k[1];
     apply(cause, k, c, l, m);
   }
+  if (!problem.logs[l].begins_warm) return m;
+  // What lags is behind by how the housing moved within its time constant.
+  const S housing_s = exp(x[1] + x[3]);
+  m.mass_behind = before[mass_before] * mass_s / (mass_s + housing_s);
+  m.sensor_behind = before[sensor_before] * set.housing.lag_s / housing_s;
+  m.drifted_s = before[drift_before] * problem.duration_s;
   return m;
 }
 
@@ -108,10 +139,18 @@ Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const 
 /// housing. Of a sensor that feels a winding that is read it is right to first order in its share: all of it would
 /// leave the housing untold.
 template <class S>
-Initial<S> begin_at(const Model<S>& model, const Start& start, const S& read_degC, const S& excess_K) {
+Initial<S> begin_at(const Model<S>& model, const Bins& log, const Start& start, const S& read_degC, const S& excess_K) {
   S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);
   if (model.feels_winding) housing_degC -= model.sensor_share * excess_K;
-  return {(std::isnan(start.core_degC) ? housing_degC : read_degC) + excess_K, housing_degC, read_degC + excess_K};
+  const S sensed_degC = housing_degC;
+  S mass_degC = housing_degC;
+  if (log.begins_warm && start.bin == 0) {
+    const double sink_degC = log.bins.front().input.boundary_degC[0];
+    housing_degC += model.sensor_behind * (sensed_degC - sink_degC);
+    mass_degC = housing_degC - model.mass_behind * (housing_degC - sink_degC);
+  }
+  return {(std::isnan(start.core_degC) ? housing_degC : read_degC) + excess_K, housing_degC, mass_degC, sensed_degC,
+          read_degC + excess_K};
 }
 
 template <int N>
@@ -162,23 +201,33 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
   out.information = Eigen::MatrixXd::Zero(all, all);
   Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, averaged.columns());
   Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(averaged.columns());
+  const std::vector<Before> of_before = before_of(chosen);
   int own = shared;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
     const Bins& log = problem.logs[l];
+    const int end = own + static_cast<int>(own_count(log));
     Dual<N> local[N];
     for (int i = 0; i < shared; ++i) local[i] = Dual<N>::variable(x[i], i);
-    // All starts of a log share two directions, for no reading depends on more than the last of them.
-    const auto model = build<Dual<N>>(problem, chosen, local, l);
+    // All starts of a log share two directions, for no reading depends on more than the last of them. What was before
+    // it has others.
+    const int of_start = shared + per_start_count;
+    int places[N], directions = of_start;
+    Dual<N> before[before_count] = {0, 0, 0};
+    for (std::size_t i = 0; log.begins_warm && i < of_before.size(); ++i, ++directions) {
+      places[directions] = end - before_count + of_before[i];
+      before[of_before[i]] = Dual<N>::variable(x[places[directions]], directions);
+    }
+    const auto model = build<Dual<N>>(problem, chosen, local, before, l);
     std::vector<Initial<Dual<N>>> initial;
     for (std::size_t s = 0; s < log.starts.size(); ++s) {
       const int at = own + per_start_count * static_cast<int>(s);
-      initial.push_back(
-          begin_at(model, log.starts[s], Dual<N>::variable(x[at], shared), Dual<N>::variable(x[at + 1], shared + 1)));
+      initial.push_back(begin_at(model, log, log.starts[s], Dual<N>::variable(x[at], shared),
+                                 Dual<N>::variable(x[at + 1], shared + 1)));
     }
     Sums<N> sums;
     const auto take_sums = [&] {
-      const auto place = [&](int i) { return i < shared ? i : own + i - shared; };
-      for (int i = 0; i < shared + per_start_count; ++i) {
+      const auto place = [&](int i) { return i < shared ? i : i < of_start ? own + i - shared : places[i]; };
+      for (int i = 0; i < directions; ++i) {
         out.gradient[place(i)] += sums.H[i].v;
         for (int j = 0; j <= i; ++j) {
           out.information(place(i), place(j)) += sums.H[i].slope(j);
@@ -220,7 +269,7 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
     });
     if (!finite || !std::isfinite(sums.misfit)) return false;
     take_sums();
-    own += per_start_count * static_cast<int>(log.starts.size() - begun);  // of a log that was cut, those after
+    own = end;  // of a log that was cut, past those after
   }
   if (!std::isfinite(out.misfit)) return false;
   const Eigen::VectorXd explained = averaged.inverse * residual_with_averaged;
@@ -233,10 +282,14 @@ bool evaluate(const Problem& problem, const Averaged& averaged, const std::vecto
 
 bool evaluate_any(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
                   const Eigen::VectorXd& x, Evaluation& out) {
-  const int n = base_count + coordinates_of(chosen) + per_start_count;
+  const bool warm =
+      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.begins_warm; });
+  const int n =
+      base_count + coordinates_of(chosen) + per_start_count + (warm ? static_cast<int>(before_of(chosen).size()) : 0);
   if (n <= 6) return evaluate<6>(problem, averaged, chosen, x, out);
   if (n <= 8) return evaluate<8>(problem, averaged, chosen, x, out);
-  return evaluate<10>(problem, averaged, chosen, x, out);  // two causes have four parameters at most
+  if (n <= 10) return evaluate<10>(problem, averaged, chosen, x, out);
+  return evaluate<12>(problem, averaged, chosen, x, out);  // two causes have four parameters at most
 }
 
 double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
@@ -442,12 +495,18 @@ Eigen::Index initial_of(const Problem& problem, const Fit& f, std::size_t log) {
   return at;
 }
 
+/// And what is said there of what was before it; nothing where it does not begin warm.
+Eigen::Index before_of(const Problem& problem, const Fit& f, std::size_t log) {
+  const Bins& bins = problem.logs[log];
+  return initial_of(problem, f, log) + own_count(bins) - (bins.begins_warm ? before_count : 0);
+}
+
 std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, std::size_t log) {
-  const auto model = build<double>(problem, f.chosen, f.x.data(), log);
+  const auto model = model_of(problem, f, log);
   std::vector<Initial<double>> out;
   Eigen::Index at = initial_of(problem, f, log);
   for (const Start& start : problem.logs[log].starts) {
-    out.push_back(begin_at(model, start, f.x[at], f.x[at + 1]));
+    out.push_back(begin_at(model, problem.logs[log], start, f.x[at], f.x[at + 1]));
     at += per_start_count;
   }
   return out;
@@ -625,6 +684,17 @@ Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordina
   return motor;
 }
 
+Fit bare(const Problem& problem, const Fit& f) {
+  Fit out = f;
+  out.chosen.clear();
+  out.x.resize(f.x.size() - f.cause_coordinates());
+  out.x << f.x.head(base_count), f.x.tail(out.x.size() - base_count);
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    if (problem.logs[l].begins_warm) out.x.segment(before_of(problem, out, l), before_count).setZero();
+  }
+  return out;
+}
+
 double cost_of_noise(const Problem& problem) {
   double sum = 0.5 * Averaged(problem).log_determinant;
   for (const Bins& log : problem.logs) {
@@ -676,6 +746,8 @@ Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f) {
       out.x.segment(initial_of(whole, out, l) + at, per_start_count) =
           f.x.segment(initial_of(fitted, f, l) + at, per_start_count);
     }
+    if (whole.logs[l].begins_warm && fitted.logs[l].begins_warm)
+      out.x.segment(before_of(whole, out, l), before_count) = f.x.segment(before_of(fitted, f, l), before_count);
   }
   return out;
 }
@@ -688,7 +760,8 @@ double parameter_value(const Problem& problem, const Cause& cause, int p, double
 }
 
 Model<double> model_of(const Problem& problem, const Fit& f, std::size_t log) {
-  auto model = build<double>(problem, f.chosen, f.x.data(), log);
+  const double* before = problem.logs[log].begins_warm ? &f.x[before_of(problem, f, log)] : nullptr;
+  auto model = build<double>(problem, f.chosen, f.x.data(), before, log);
   model.uneven_per_A2 = f.uneven_per_A2;
   return model;
 }

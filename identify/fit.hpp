@@ -3,7 +3,8 @@
 //
 // Levenberg-Marquardt on whitened residuals with exact sensitivities (dual.hpp), box bounds and weak priors.
 // Coordinates: ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log,
-// and again after each pause, the housing's initial temperature and the winding's excess over it.
+// and again after each pause, the housing's initial temperature and the winding's excess over it; for each log that
+// begins warm then what it has behind it.
 #pragma once
 
 #include <Eigen/Dense>
@@ -14,6 +15,9 @@
 namespace identify {
 
 inline constexpr int base_count = 4, per_start_count = 2;
+/// What went on before a log that begins warm: as how far the housing moved a further mass and a late sensor show it,
+/// in shares of its rise within its time constant; and for how much of Problem::duration_s an ambient drifted.
+enum Before { mass_before, sensor_before, drift_before, before_count };
 
 struct Fit {
   std::vector<Chosen> chosen;
@@ -57,6 +61,9 @@ int coordinate_of(const Fit& fit, Edit edit);
 
 /// The same motor with a further cause of these coordinates: nothing is fitted.
 Fit with_cause(Fit motor, const char* id, std::initializer_list<double> coordinates);
+
+/// The motor that a fit found, without its causes.
+Fit bare(const Problem& problem, const Fit& fit);
 
 /// What the noise model itself costs, half the logarithm of the readings' covariance: to compare fits that assume
 /// different noise.

@@ -181,19 +181,10 @@ Leeway room(const Run& whole, int halves) {
   return out;
 }
 
-/// The motor that a fit found, without its causes.
-Fit bare(const Fit& f) {
-  Fit out = f;
-  out.chosen.clear();
-  out.x.resize(f.x.size() - f.cause_coordinates());
-  out.x << f.x.head(base_count), f.x.tail(out.x.size() - base_count);
-  return out;
-}
-
 }  // namespace
 
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
-  const Fit baseline = bare(motor);
+  const Fit baseline = bare(problem, motor);
   // Beside its causes, for the heat they make is late too; not beside what the sensor or its clock does already.
   const bool sensor = std::any_of(motor.chosen.begin(), motor.chosen.end(), [](const Chosen& c) {
     const Edit e = cause_of(c).edit;
@@ -212,7 +203,7 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
 }
 
 std::vector<Leeway> leeway_of_an_unseen_winding(const Problem& problem, const Fit& fit) {
-  const Fit motor = bare(fit);
+  const Fit motor = bare(problem, fit);
   std::vector<Leeway> out;
   for (const auto& [id, size] :
        {std::pair{"natural_convection", ordinary_convection_exponent}, std::pair{"sensor_gain", ordinary_sensor_gain}})

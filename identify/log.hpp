@@ -23,6 +23,9 @@ namespace identify {
 /// in proportion to it.
 inline constexpr double no_ohm_degC = 20 - 1 / 0.00393;
 
+/// Of a motor as warm as its surroundings: two sensors beside each other differ by as much.
+inline constexpr double soaked_K = 1;
+
 /// What a winding that its resistance tells goes by.
 struct Reference {
   double degC = missing;     // the motor at rest

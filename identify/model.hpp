@@ -20,9 +20,13 @@ struct Model {
 
   S current_offset_A = S(0);  // true current = recorded + offset
   S delay_s = S(0);           // temperatures answer to the inputs of so long ago
-  S drift_K_per_s = S(0);     // true sink = recorded + drift * time
-  S stall_share = S(0);       // extra share of copper heat while the rotor stands
-  S cooling_factor = S(1);    // of the sink conductance, from cooling_from_s on
+  S drift_K_per_s = S(0);     // true sink = recorded + drift * (time + drifted_s)
+  S drifted_s = S(0);
+  // Where a log begins warm: how far a further mass is behind the housing, as a share of what that is above the sink,
+  // and a late sensor, of what it reads above that.
+  S mass_behind = S(0), sensor_behind = S(0);
+  S stall_share = S(0);     // extra share of copper heat while the rotor stands
+  S cooling_factor = S(1);  // of the sink conductance, from cooling_from_s on
   S cooling_from_s = S(0);
   double uneven_per_A2 = 0;  // times i^4 of a standing rotor: what its uneven phases heat more than the inputs have
   S sensor_share = S(0);     // the housing sensor reads housing + share * (winding - housing)

@@ -85,13 +85,15 @@ double drifted_share(const Problem& problem, const Fit& f) {
   const int at = coordinate_of(f, Edit::drift);
   if (at < 0) return 0;
   double most = 0;
-  for (const Bins& log : problem.logs) {
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const Bins& log = problem.logs[l];
     double rise_K = 0;
     for (const Bin& bin : log.bins) {
       for (const double read_degC : {bin.housing_degC, bin.core_degC})
         rise_K = std::fmax(rise_K, read_degC - bin.input[thermal::Boundary::ambient]);
     }
-    most = std::max(most, std::abs(f.x[at]) * log.duration_s() / std::max(rise_K, 1.0));
+    const double drifting_s = log.duration_s() + model_of(problem, f, l).drifted_s;
+    most = std::max(most, std::abs(f.x[at]) * drifting_s / std::max(rise_K, 1.0));
   }
   return most;
 }

@@ -27,7 +27,8 @@ namespace identify {
 template <class S>
 struct Initial {
   S core_degC, housing_degC;
-  S own;  // depends on this start's coordinates, and on nothing else
+  S mass_degC, sensed_degC;  // of a further mass, of a housing sensor that lags: where a log begins, and only there
+  S own;                     // depends on this start's coordinates, and on nothing else
 };
 
 namespace replay_detail {
@@ -135,8 +136,9 @@ void correct(const Model<S>& model, const Bins& log, const Splines& splines, std
         more * (in[Drive::current_A2] + (more - 1.0) * (model.uneven_per_A2 + log.uneven_per_A2) * then.uneven_A4);
   }
   if (model.drifts) {
-    in[Boundary::ambient] += model.drift_K_per_s * time_s;
-    in[Boundary::coolant] += model.drift_K_per_s * time_s;
+    const S drifted_K = model.drift_K_per_s * (model.drifted_s + time_s);
+    in[Boundary::ambient] += drifted_K;
+    in[Boundary::coolant] += drifted_K;
   }
   if (model.cooling_changes) {
     constexpr double rise_s = 6;  // short for a housing, long enough for a slope
@@ -162,7 +164,7 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   const bool corrected = model.offset || model.delayed || model.drifts || model.stalls || model.cooling_changes ||
                          model.uneven_per_A2 != 0;
   thermal::HeatInput<S> in;
-  Vector T = Vector::Constant(initial.front().housing_degC), next;
+  Vector T = Vector::Constant(initial.front().mass_degC), next;
   const int housing = set.housing.node;
   const bool lags = value_of(set.housing.lag_s) > 0;
   const bool reads_straight = set.housing.gain_error == 0 && set.housing.offset_K == 0;
@@ -172,7 +174,8 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
   // After a pause a further mass goes on from where it is; that this depends on the earlier start is left out.
   const auto begin = [&](const Initial<S>& from) {
     for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.own);
-    T[housing] = lagged = from.housing_degC;
+    T[housing] = from.housing_degC;
+    lagged = from.sensed_degC;
     // A late sensor is where it reads, and not where the housing is.
     const double read = log.starts[begun].housing_degC;
     if (begun > 0 && lags && !std::isnan(read)) lagged = housing_behind(set.housing, S(read));

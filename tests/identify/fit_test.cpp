@@ -84,14 +84,21 @@ Problem paused(Problem problem) {
   return problem;
 }
 
+/// The same as if it had begun warm.
+Problem warm(Problem problem) {
+  problem.logs[0].begins_warm = true;
+  return problem;
+}
+
 void expect_exact_sensitivities(const Problem& by_current, const Problem& by_power) {
   const auto starts = static_cast<Eigen::Index>(by_current.logs[0].starts.size());
+  const Eigen::Index before = by_current.logs[0].begins_warm ? identify::before_count : 0;
   for (std::size_t c = 0; c < identify::causes().size(); ++c) {
     const std::vector<Chosen> chosen = {{static_cast<int>(c), 0}};
     const auto& cause = identify::causes()[c];
     const Problem& problem = cause.needs == identify::Needs::logs_of_power ? by_power : by_current;
     const Eigen::Index own = identify::base_count + static_cast<Eigen::Index>(cause.parameters.size()),
-                       n = own + starts * identify::per_start_count;
+                       n = own + starts * identify::per_start_count + before;
     Eigen::VectorXd x(n), gradient;
     x.head(4) << std::log(1.4), std::log(13.0), std::log(1.0), std::log(21.0);
     for (std::size_t p = 0; p < cause.parameters.size(); ++p) {
@@ -101,7 +108,15 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
                                                 : parameter.none + 0.31 * parameter.typical;
     }
     for (Eigen::Index s = 0; s < starts; ++s) x.segment(own + 2 * s, 2) << 24.5 + 5 * static_cast<double>(s), 0.3;
+    x.tail(before).setConstant(0.05);
     ASSERT_LT(identify::misfit_at(problem, chosen, x, &gradient), 1e200) << cause.id;
+    if (before > 0) {
+      using enum identify::Edit;
+      for (const auto& [edit, what] : {std::pair{mass, identify::mass_before},
+                                       {sensor_lag, identify::sensor_before},
+                                       {drift, identify::drift_before}})
+        EXPECT_EQ(std::abs(gradient[n - before + what]) > 1, cause.edit == edit) << cause.id << " and what was before";
+    }
     for (std::size_t p = 0; p < cause.parameters.size(); ++p)
       EXPECT_GT(std::abs(gradient[identify::base_count + static_cast<Eigen::Index>(p)]), 1)
           << cause.id << " does nothing here";
@@ -125,6 +140,11 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
 
 TEST(Fit, SensitivitiesAgreeWithDifferencesForEveryCause) {
   expect_exact_sensitivities(with_all_drives(0), with_all_drives(1));
+}
+
+TEST(Fit, SoTheyDoWhereALogBeginsWarm) {
+  expect_exact_sensitivities(warm(with_all_drives(0)), warm(with_all_drives(1)));
+  expect_exact_sensitivities(warm(paused(with_all_drives(0))), warm(paused(with_all_drives(1))));
 }
 
 TEST(Fit, SoTheyDoAfterAPause) { expect_exact_sensitivities(paused(with_all_drives(0)), paused(with_all_drives(1))); }
@@ -433,7 +453,7 @@ TEST(Fit, SeveralLogsShareTheMotorAndStartWhereTheyStart) {
   const auto logs = tests::bench_logs({cold, warm});
   const Problem problem = identify::problem_of(logs, sheet);
   const Fit f = identify::fit(problem, {});
-  ASSERT_EQ(f.x.size(), 8);
+  ASSERT_EQ(f.x.size(), 8 + identify::before_count);
   EXPECT_NEAR(f.x[4], 24, 1);
   EXPECT_NEAR(f.x[6], 60, 1);
   const Fit one = identify::fit(identify::problem_of({logs[0]}, sheet), {});

@@ -242,6 +242,36 @@ TEST(SlowSearch, AThirdMassAChangeOfCoolingAndALateSensorGoOnThroughAPause) {
   }
 }
 
+/// A log whose first minutes are lost.
+std::vector<identify::Log> without_its_first(double seconds, std::vector<identify::Log> logs) {
+  const auto rows = static_cast<std::ptrdiff_t>(seconds * 10);
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + rows);
+  }
+  for (double& time_s : logs[0].of(identify::Role::time)) time_s -= seconds;
+  return logs;
+}
+
+TEST(SlowSearch, WhatWentOnBeforeALogIsNoSecondCause) {
+  struct Case {
+    tests::Duty duty;
+    const char* id;
+    double lost_s;
+    const char* otherwise;
+  };
+  using enum tests::Duty;
+  for (const Case& c : {Case{robot, "third_mass", 300, "cooling_change + third_mass, begun with the housing"},
+                        {designed, "third_mass", 500, "a tie of pairs, begun with the housing"},
+                        {designed, "sensor_lag", 300, "as before"},
+                        {robot, "ambient_drift", 300, "as before"}}) {
+    const Hidden log = hidden({.duty = c.duty, .seed = 4242, .effects = {c.id}});
+    const auto found = identify::search(identify::problem_of(without_its_first(c.lost_s, log.logs), log.log.sheet));
+    EXPECT_EQ(found.verdict, Verdict::explained) << c.id << ": " << c.otherwise;
+    ASSERT_FALSE(found.tied.empty()) << c.id;
+    EXPECT_EQ(found.tied.front(), std::vector<std::string>{c.id}) << c.otherwise;
+  }
+}
+
 TEST(SlowSearch, WithTheTrueCauseTakenOutOfTheTableNoOtherIsNamedThatDoesNotComeNear) {
   for (const char* id : {"current_offset", "neighbour_heat", "ac_copper_loss"}) {
     const Problem problem = hidden({id}, 4242).problem;
