@@ -329,19 +329,21 @@ double left_open_K(const Problem& problem, const Fit& baseline, const std::vecto
 }
 
 /// Does the load alternate faster than rows are written, so that each is a draw? From one row to the next but one a
-/// load that steps changes twice as much, squared, as from row to row, and one that goes smoothly four times.
+/// load that steps changes twice as much, squared, as from row to row, and one that goes smoothly four times. What is
+/// small beside all heat is noise.
 bool alternates_between_rows(const std::vector<Log>& logs) {
   constexpr double least = 1.7;  // of white noise it is 1, of gaits of 0.8 to 2 Hz in rows of a second 1.1 to 1.6
-  double once = 0, twice = 0;
+  constexpr double much = 0.1;   // of gaits of 0.6 to 6 Hz in rows of 0.1 to 2 s 0.3 to 0.7
+  double once = 0, twice = 0, all = 0;
   for (const Log& log : logs) {
     std::vector<double> heat = told_next(log.of(heat_of(log)));
     if (!log.has(Role::power)) std::transform(heat.begin(), heat.end(), heat.begin(), [](double A) { return A * A; });
     for (std::size_t i = 2; i < heat.size(); ++i) {
       const double one = heat[i] - heat[i - 1], two = heat[i] - heat[i - 2];
-      if (!std::isnan(one) && !std::isnan(two)) once += one * one, twice += two * two;
+      if (!std::isnan(one) && !std::isnan(two)) once += one * one, twice += two * two, all += heat[i] * heat[i];
     }
   }
-  return twice < least * once;
+  return twice < least * once && once > much * all;
 }
 
 /// How far two simulations of the logs' housings differ, rms; of their windings, where no housing was read.
