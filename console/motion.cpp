@@ -135,7 +135,7 @@ void fault(Console& console, const std::string& axis, bool clear) {
   console.say(text, json);
 }
 
-Json json_of(const wire::Outlook& outlook) {
+Json members_of(const wire::Outlook& outlook) {
   return {{"feasible", outlook.feasible != 0},
           {"peak_degC", number(outlook.peak_degC)},
           {"limits_after_s", number(outlook.limits_after_s)},
@@ -180,10 +180,10 @@ void ask(Console& console, const std::string& axis, const std::string& course, b
   text += fmt::format("  standing, the hottest phase at any angle:  {}.\n", sentence_of(standing));
   text += fmt::format("  turning, all phases share the heat:        {}.\n", sentence_of(turning));
   const bool by_turning = turns || (stands && !goes);
-  Json json = json_of(by_turning ? turning : standing);
+  Json json = members_of(by_turning ? turning : standing);
   json["assumed"] = by_turning ? "turning" : "standing";
-  json["standing"] = json_of(standing);
-  json["turning"] = json_of(turning);
+  json["standing"] = members_of(standing);
+  json["turning"] = members_of(turning);
   console.say(text, json);
 }
 
