@@ -182,7 +182,7 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
     return in_milliseconds(logs.front());
   // A column that is ever below 50 would be below 10 degC: no room where motors are measured. Nor is what heats colder
   // than what cools it: a log that begins warm would be.
-  const Unit& degF = *unit_named("degF");
+  const Unit degF = *unit_named("degF");
   const auto may_be_fahrenheit = [&](Role role) {
     return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
       constexpr double sensors_K = 3;  // two may differ by
@@ -287,7 +287,7 @@ std::vector<double> told_around(const std::vector<double>& load, bool most) {
   std::vector<double> out = told;
   for (std::size_t i = 1; i + 1 < told.size(); ++i) {
     for (const double x : {told[i - 1], told[i + 1]}) {
-      if ((std::abs(x) > std::abs(out[i])) == most) out[i] = x;
+      if (most ? std::abs(x) > std::abs(out[i]) : std::abs(x) < std::abs(out[i])) out[i] = x;
     }
   }
   return out;
