@@ -22,12 +22,6 @@ void check_range(const Log& log, Role role, double low, double high, const std::
   }
 }
 
-double lowest(const std::vector<double>& v) {
-  double low = missing;
-  for (const double x : v) low = std::fmin(low, x);  // which passes over what is missing
-  return low;
-}
-
 /// Deviations from a mean, or shares of a range, as data sets for machine learning have them, in all columns.
 void check_normalised(const Log& log) {
   constexpr double most = 6;  // standard deviations, or what they would be in A, rad/s and degC: no use
@@ -80,6 +74,12 @@ void forget_placeholders(Log& log, Role role) {
 }
 
 }  // namespace
+
+double lowest(const std::vector<double>& v) {
+  double low = missing;
+  for (const double x : v) low = std::fmin(low, x);  // which passes over what is missing
+  return low;
+}
 
 double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 40 * motor->rated_current_A : 1000; }
 

@@ -14,6 +14,9 @@ namespace identify {
 /// beyond any board this project drives or any traction log it was shown.
 double most_current_A(const std::optional<wire::Motor>& motor);
 
+/// The least of what is told; missing when nothing is.
+double lowest(const std::vector<double>& column);
+
 /// What a logger writes for a sensor that does not answer, -999 or -32768, is no temperature.
 void forget_impossible(Log& log);
 

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <random>
 
 #include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
 #include "identify/filled.hpp"
+#include "identify/impossible.hpp"
 #include "identify/parallel.hpp"
 #include "identify/pauses.hpp"
 #include "identify/units.hpp"
@@ -130,15 +130,6 @@ std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::
   return logs;
 }
 
-/// The least reading; missing when there is none.
-double least_of(const std::vector<double>& column) {
-  double least = missing;
-  for (const double x : column) {
-    if (!(x >= least)) least = std::isnan(x) ? least : x;
-  }
-  return least;
-}
-
 /// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
 /// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
 std::string misread_columns(const Problem& problem, const Found& found, const std::vector<Log>& logs,
@@ -186,7 +177,7 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
   const auto may_be_fahrenheit = [&](Role role) {
     return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
       constexpr double sensors_K = 3;  // two may differ by
-      const double least = least_of(log.of(role)), sink_degC = least_of(log.of(sink_of(log)));
+      const double least = lowest(log.of(role)), sink_degC = lowest(log.of(sink_of(log)));
       return log.has(role) && least >= 50 && !(degF.factor * (least + degF.offset) < sink_degC - sensors_K);
     });
   };
