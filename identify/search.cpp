@@ -213,7 +213,8 @@ struct Left {
 
   std::string words() const {
     return fmt::format(
-        "two resistors missed {:.2f} K; beside the best set a slow disturbance of {:.2f} K would gain another {:.1f}; "
+        "two resistors so fitted missed {:.2f} K; beside the best set a slow disturbance of {:.2f} K would gain "
+        "another {:.1f}; "
         "over a disturbance alone the two gain {:.1f}, and the set {:.1f} where readings are believed no closer than "
         "a model can be right{}",
         before_K, after_K, evidence, explains, still,
@@ -413,8 +414,10 @@ Found search(const Problem& given, const Margins& margins, const std::vector<std
   out.baseline = out.chosen = field.baseline;
   out.noise = problem.noise;
   out.singles = field.singles;
-  out.steps.push_back(
-      fmt::format("The two-resistor model was fitted; what it leaves is {:.2f} times the noise.", out.baseline.ratio));
+  out.steps.push_back(fmt::format(
+      "Two resistors were fitted by likelihood, as causes are, and not to the fewest kelvins, as where their "
+      "misses are told; what they leave is {:.2f} times the noise.",
+      out.baseline.ratio));
   const Disturbance without_causes = disturbance_of(problem, out.baseline.fit);
   if (ends_without_a_name(problem, field, without_causes, margins, out)) {
     doing("fitting what a board gets");

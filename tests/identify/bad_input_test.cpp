@@ -137,7 +137,7 @@ TEST(SlowBadInput, TimeInMinutes) {
   const Outcome r = run(spoilt(in_min) + " --explain");
   says(r.out, "Verdict: insufficient");
   says(r.out, "--column time_s=time_s:min");
-  says(r.out, "The two-resistor model was fitted; what it leaves is");
+  says(r.out, "Two resistors were fitted by likelihood");
 }
 
 TEST(SlowBadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {
