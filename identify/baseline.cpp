@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "identify/leeway.hpp"
+#include "identify/replayed.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {

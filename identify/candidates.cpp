@@ -6,6 +6,7 @@
 
 #include "identify/baseline.hpp"
 #include "identify/parallel.hpp"
+#include "identify/replayed.hpp"
 
 namespace identify {
 namespace {

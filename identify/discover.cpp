@@ -14,6 +14,7 @@
 #include "identify/masks.hpp"
 #include "identify/model_file.hpp"
 #include "identify/refusals.hpp"
+#include "identify/replayed.hpp"
 #include "identify/search.hpp"
 #include "wire/pc/user_error.hpp"
 

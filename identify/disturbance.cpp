@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "identify/parallel.hpp"
+#include "identify/replayed.hpp"
 
 namespace identify {
 namespace {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "identify/replayed.hpp"
 #include "thermal/indices.hpp"
 
 namespace identify {

@@ -6,291 +6,16 @@
 #include <limits>
 #include <numbers>
 
-#include "identify/replay.hpp"
-#include "identify/whitening.hpp"
+#include "identify/misfit.hpp"
+#include "identify/replayed.hpp"
 
 namespace identify {
 namespace {
-
-constexpr double initial_sd_K = 3;  // the first readings tell the initial state this well
-// Far beyond what a first reading is wrong by, and what a winding of class F can be above its housing.
-constexpr double initial_room_K = 60, most_excess_K = 150;
-// Over a housing that is warm when the log begins, a winding may be this share of its rise warmer again; R1 over R2 of
-// catalogues is 0.03 to 1.4.
-constexpr double warm_excess_share = 0.5;
-// Before a log that begins warm its housing moved by this share of its rise within its time constant: all of it or
-// none, evenly likely, the root of whose mean square this is; three times it under a burst. And an ambient may have
-// drifted for as long again.
-const double before_sd = 1 / std::sqrt(3.0);
-constexpr double least_before[] = {-1, -3, 0}, most_before[] = {1, 3, 1};
 
 // How large a cause is follows Student's t around nothing, the rest Gaussians: fifteen times what is typical is rare,
 // and no reason to believe in two imitations of a typical size. Degrees of freedom: Lange, Little, Taylor, JASA 84
 // (1989) 881.
 constexpr double tail_dof = 4;
-
-struct Coordinate {
-  double start, prior, sd, low, high;
-  bool of_cause = false;
-};
-
-/// Initial coordinates of a log.
-Eigen::Index own_count(const Bins& log) {
-  return per_start_count * static_cast<Eigen::Index>(log.starts.size()) + (log.begins_warm ? before_count : 0);
-}
-
-/// What of the causes depends on what was before a log.
-std::vector<Before> before_of(const std::vector<Chosen>& chosen) {
-  std::vector<Before> out;
-  for (const Chosen& c : chosen) {
-    if (cause_of(c).edit == Edit::mass) out.push_back(mass_before);
-    if (cause_of(c).edit == Edit::sensor_lag) out.push_back(sensor_before);
-    if (cause_of(c).edit == Edit::drift) out.push_back(drift_before);
-  }
-  return out;
-}
-
-int coordinates_of(const std::vector<Chosen>& chosen) {
-  int n = 0;
-  for (const Chosen& c : chosen) n += static_cast<int>(cause_of(c).parameters.size());
-  return n;
-}
-
-std::vector<Coordinate> layout(const Problem& problem, const std::vector<Chosen>& chosen) {
-  const Belief& b = problem.belief;
-  std::vector<Coordinate> out;
-  for (const double v : {b.R1_K_per_W, b.R2_K_per_W, b.C1_J_per_K, b.C2_J_per_K}) {
-    const double x = std::log(v);
-    out.push_back({x, x, b.log_sd, x - b.log_room, x + b.log_room});
-  }
-  for (const Chosen& c : chosen) {
-    for (const Parameter& p : cause_of(c).parameters) {
-      if (p.logarithmic) {
-        const double centre = std::log(p.none);
-        out.push_back({centre, centre, p.typical, std::log(p.low), std::log(p.high), true});
-      } else {
-        out.push_back({p.none, p.none, p.typical, p.low, p.high, true});
-      }
-    }
-  }
-  for (const Bins& log : problem.logs) {
-    for (const Start& start : log.starts) {
-      const double core = start.core_degC, housing = start.housing_degC;
-      const double at = std::isnan(housing) ? core : housing;
-      const double sink = log.bins[std::min(start.bin, log.bins.size() - 1)].input.boundary_degC[0];
-      const double known = std::isnan(at) ? sink : at;
-      out.push_back({known, known, initial_sd_K, known - initial_room_K, known + initial_room_K});
-      const double excess = std::isnan(core) || std::isnan(housing) ? 0 : core - housing;
-      const double excess_sd_K =
-          std::isnan(core) ? warm_excess_share * std::max(0.0, known - sink) : problem.noise.core_white_K;
-      out.push_back({excess, excess, initial_sd_K + excess_sd_K, -initial_room_K, most_excess_K});
-    }
-    const std::vector<Before> before = before_of(chosen);
-    for (int i = 0; log.begins_warm && i < before_count; ++i) {
-      const bool counts = std::find(before.begin(), before.end(), i) != before.end();
-      out.push_back({0, 0, before_sd, counts ? least_before[i] : 0, counts ? most_before[i] : 0});
-    }
-  }
-  return out;
-}
-
-/// What simulates log `l` at coordinates x of base and causes; `before`: of what was before it, where it begins warm.
-template <class S>
-Model<S> build(const Problem& problem, const std::vector<Chosen>& chosen, const S* x, const S* before, std::size_t l) {
-  using std::exp;
-  const Belief& belief = problem.belief;
-  Model<S> m;
-  auto& set = m.set;
-  set.node_count = 2;
-  set.nodes[0] = {exp(x[2]), {}};
-  set.nodes[1] = {exp(x[3]), {}};
-  set.link_count = 2;
-  set.links[0] = {0, 1, thermal::LinkLaw::constant, exp(-x[0]), S(0)};
-  set.links[1] = {1, thermal::boundary_end(thermal::Boundary::ambient), thermal::LinkLaw::constant, exp(-x[1]), S(0)};
-  set.source_count = 1;
-  if (problem.heated_by_power())
-    set.sources[0] = {0, thermal::Drive::power_W, S(1), S(0)};
-  else
-    set.sources[0] = {0, thermal::Drive::current_A2, S(belief.ohm), S(belief.copper_per_K)};
-  set.housing = {1, S(0), S(0), S(0)};
-  S mass_s(0);
-  int at = base_count;
-  for (const Chosen& c : chosen) {
-    const Cause& cause = cause_of(c);
-    S k[4];
-    for (std::size_t p = 0; p < cause.parameters.size(); ++p, ++at) {
-      const Parameter& parameter = cause.parameters[p];
-      const double scale = problem.scale(parameter.scale, cause.drive);
-      k[p] = (parameter.logarithmic ? exp(x[at]) : x[at]) * scale;
-    }
-    if (cause.edit == Edit::mass) mass_s = k[0] * k[1];
-    apply(cause, k, c, l, m);
-  }
-  if (!problem.logs[l].begins_warm) return m;
-  // What lags is behind by how the housing moved within its time constant.
-  const S housing_s = exp(x[1] + x[3]);
-  m.mass_behind = before[mass_before] * mass_s / (mass_s + housing_s);
-  m.sensor_behind = before[sensor_before] * set.housing.lag_s / housing_s;
-  m.drifted_s = before[drift_before] * problem.duration_s;
-  return m;
-}
-
-/// From what the housing's sensor reads and what the winding is above that; where no winding is read, above the
-/// housing. Of a sensor that feels a winding that is read it is right to first order in its share: all of it would
-/// leave the housing untold.
-template <class S>
-Initial<S> begin_at(const Model<S>& model, const Bins& log, const Start& start, const S& read_degC, const S& excess_K) {
-  S housing_degC = replay_detail::housing_behind(model.set.housing, read_degC);
-  if (model.feels_winding) housing_degC -= model.sensor_share * excess_K;
-  const S sensed_degC = housing_degC;
-  S mass_degC = housing_degC;
-  if (log.begins_warm && start.bin == 0) {
-    const double sink_degC = log.bins.front().input.boundary_degC[0];
-    housing_degC += model.sensor_behind * (sensed_degC - sink_degC);
-    mass_degC = housing_degC - model.mass_behind * (housing_degC - sink_degC);
-  }
-  return {(std::isnan(start.core_degC) ? housing_degC : read_degC) + excess_K, housing_degC, mass_degC, sensed_degC,
-          read_degC + excess_K};
-}
-
-template <int N>
-struct Sums {
-  Dual<N> H[N] = {};  // rows of products of sensitivities, to the diagonal's pair; values: with the residual
-  double misfit = 0;
-  int readings = 0;
-  Dual<N> with_averaged[Averaged::most] = {};  // products of residual and sensitivities with what is averaged over
-};
-
-/// Adds one channel's bin k of log l to the sums; n readings, 0: none.
-template <int N>
-void add(Sums<N>& sums, Whitener& w, Foretold<Dual<N>>& foretold, const Dual<N>& simulated, double measured, double n,
-         const Averaged& averaged, std::vector<std::vector<double>> Leeway::*channel, std::size_t l, std::size_t k) {
-  if (n > 0) {
-    w.reading(n);
-    Dual<N> e = simulated - measured;
-    foretold.whiten(w, e);
-    sums.misfit += 0.5 * e.v * e.v;
-    ++sums.readings;
-    for (int i = 0; i < N; ++i) {
-      sums.H[i].v += e.v * e.slope(i);
-      for (int pair = 0; pair <= i / 2; ++pair) sums.H[i].d[pair] += e.d[pair] * e.slope(i);
-    }
-    for (std::size_t i = 0; i < averaged.effects.size(); ++i)
-      sums.with_averaged[i] += e * (averaged.effects[i].*channel)[l][k];
-  }
-  w.step();
-  foretold.step(w);
-}
-
-struct Evaluation {
-  double misfit = 0;
-  int readings = 0;
-  Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;
-  Eigen::VectorXd leeway;  // what the residuals show of each effect averaged over, a column of Averaged each
-};
-
-template <int N>
-bool evaluate(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
-              const Eigen::VectorXd& x, Evaluation& out) {
-  const int shared = base_count + coordinates_of(chosen);
-  const int all = static_cast<int>(x.size());
-  out.misfit = 0;
-  out.readings = 0;
-  out.gradient = Eigen::VectorXd::Zero(all);
-  out.information = Eigen::MatrixXd::Zero(all, all);
-  Eigen::MatrixXd with_averaged = Eigen::MatrixXd::Zero(all, averaged.columns());
-  Eigen::VectorXd residual_with_averaged = Eigen::VectorXd::Zero(averaged.columns());
-  const std::vector<Before> of_before = before_of(chosen);
-  int own = shared;
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Bins& log = problem.logs[l];
-    const int end = own + static_cast<int>(own_count(log));
-    Dual<N> local[N];
-    for (int i = 0; i < shared; ++i) local[i] = Dual<N>::variable(x[i], i);
-    // All starts of a log share two directions, for no reading depends on more than the last of them. What was before
-    // it has others.
-    const int of_start = shared + per_start_count;
-    int places[N], directions = of_start;
-    Dual<N> before[before_count] = {0, 0, 0};
-    for (std::size_t i = 0; log.begins_warm && i < of_before.size(); ++i, ++directions) {
-      places[directions] = end - before_count + of_before[i];
-      before[of_before[i]] = Dual<N>::variable(x[places[directions]], directions);
-    }
-    const auto model = build<Dual<N>>(problem, chosen, local, before, l);
-    std::vector<Initial<Dual<N>>> initial;
-    for (std::size_t s = 0; s < log.starts.size(); ++s) {
-      const int at = own + per_start_count * static_cast<int>(s);
-      initial.push_back(begin_at(model, log, log.starts[s], Dual<N>::variable(x[at], shared),
-                                 Dual<N>::variable(x[at + 1], shared + 1)));
-    }
-    Sums<N> sums;
-    const auto take_sums = [&] {
-      const auto place = [&](int i) { return i < shared ? i : i < of_start ? own + i - shared : places[i]; };
-      for (int i = 0; i < directions; ++i) {
-        out.gradient[place(i)] += sums.H[i].v;
-        for (int j = 0; j <= i; ++j) {
-          out.information(place(i), place(j)) += sums.H[i].slope(j);
-          if (i != j) out.information(place(j), place(i)) += sums.H[i].slope(j);
-        }
-        for (std::size_t e = 0; e < averaged.effects.size(); ++e)
-          with_averaged(place(i), averaged.column(e, l)) += sums.with_averaged[e].slope(i);
-      }
-      for (std::size_t e = 0; e < averaged.effects.size(); ++e)
-        residual_with_averaged[averaged.column(e, l)] += sums.with_averaged[e].v;
-      out.misfit += sums.misfit;
-      out.readings += sums.readings;
-      sums = {};
-      own += per_start_count;
-    };
-    std::size_t begun = 1;
-    Whitener housing = Whitener::housing(problem.noise, log.width_s), core = Whitener::core(problem.noise, log.width_s);
-    Foretold<Dual<N>> of_housing{0, 0}, of_core{0, 0};
-    bool finite = true;
-    // A further node brings two coordinates.
-    constexpr int most_nodes = N <= 6 ? 2 : N <= 8 ? 3 : 4;
-    replay<most_nodes>(model, log, initial, [&](std::size_t k, const Dual<N>& y2, const auto& winding) {
-      const Bin& bin = log.bins[k];
-      const Dual<N> y1 = bin.core_n > 0 ? winding() : Dual<N>(0);
-      while (begun < log.starts.size() && k == log.starts[begun].bin) {
-        take_sums();
-        for (Foretold<Dual<N>>* p : {&of_housing, &of_core}) {
-          p->wander.forget(initial[begun].own);
-          p->disturbance.forget(initial[begun].own);
-        }
-        ++begun;
-      }
-      finite = finite && std::abs(y2.v) < 1e5 && std::abs(y1.v) < 1e5;
-      add<N>(sums, housing, of_housing, y2, bin.housing_degC, static_cast<double>(bin.housing_n), averaged,
-             &Leeway::housing_K, l, k);
-      if (log.has_core)
-        add<N>(sums, core, of_core, y1, bin.core_degC, static_cast<double>(bin.core_n), averaged, &Leeway::core_K, l,
-               k);
-    });
-    if (!finite || !std::isfinite(sums.misfit)) return false;
-    take_sums();
-    own = end;  // of a log that was cut, past those after
-  }
-  if (!std::isfinite(out.misfit)) return false;
-  const Eigen::VectorXd explained = averaged.inverse * residual_with_averaged;
-  out.misfit -= 0.5 * residual_with_averaged.dot(explained);
-  out.gradient -= with_averaged * explained;
-  out.information -= with_averaged * averaged.inverse * with_averaged.transpose();
-  out.leeway = -explained;
-  return true;
-}
-
-bool evaluate_any(const Problem& problem, const Averaged& averaged, const std::vector<Chosen>& chosen,
-                  const Eigen::VectorXd& x, Evaluation& out) {
-  const bool warm =
-      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.begins_warm; });
-  const int n =
-      base_count + coordinates_of(chosen) + per_start_count + (warm ? static_cast<int>(before_of(chosen).size()) : 0);
-  if (n <= 6) return evaluate<6>(problem, averaged, chosen, x, out);
-  if (n <= 8) return evaluate<8>(problem, averaged, chosen, x, out);
-  if (n <= 10) return evaluate<10>(problem, averaged, chosen, x, out);
-  return evaluate<12>(problem, averaged, chosen, x, out);  // two causes have four parameters at most
-}
 
 double prior_cost(const std::vector<Coordinate>& c, const Eigen::VectorXd& x) {
   double sum = 0;
@@ -325,7 +50,7 @@ struct Parabola {
   Eigen::MatrixXd curvature;
   std::vector<bool> held;
 
-  Parabola(const std::vector<Coordinate>& c, const Eigen::VectorXd& x, const Evaluation& at)
+  Parabola(const std::vector<Coordinate>& c, const Eigen::VectorXd& x, const Misfit& at)
       : gradient(at.gradient), curvature(at.information), held(c.size()) {
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       const Coordinate& ci = c[static_cast<std::size_t>(i)];
@@ -367,10 +92,10 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
             const std::vector<Coordinate>& c, Eigen::VectorXd x, int most) {
   Fit out;
   out.chosen = chosen;
-  Evaluation now, trial;
+  Misfit now, trial;
   constexpr double impossible = std::numeric_limits<double>::infinity();
-  const auto cost_at = [&](const Eigen::VectorXd& at, Evaluation& e) {
-    return evaluate_any(problem, averaged, chosen, at, e) ? e.misfit + prior_cost(c, at) : impossible;
+  const auto cost_at = [&](const Eigen::VectorXd& at, Misfit& e) {
+    return evaluate(problem, averaged, chosen, at, e) ? e.sum + prior_cost(c, at) : impossible;
   };
   Eigen::VectorXd sd(x.size());
   for (Eigen::Index i = 0; i < x.size(); ++i) sd[i] = c[static_cast<std::size_t>(i)].sd;
@@ -380,7 +105,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   Parabola here(c, x, now);
   for (int in_vain = 0;;) {
     // In log-likelihood, so little that it changes no decision; of a model that misses by more than noise as much more.
-    const double enough = 0.005 * std::max(1.0, 2 * now.misfit / std::max(1, now.readings));
+    const double enough = 0.005 * std::max(1.0, 2 * now.sum / std::max(1, now.readings));
     const Eigen::VectorXd newton = here.step_against(here.gradient, 0);
     out.promise = -0.5 * here.gradient.dot(newton);  // Newton decrement: what a full step still promises
     out.settled = out.promise < enough;
@@ -432,7 +157,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   out.from_data = now.information;
   out.gradient = here.gradient;
   out.cost = cost;
-  out.misfit = now.misfit;
+  out.misfit = now.sum;
   out.readings = now.readings;
   out.at_bound = here.held;
   return out;
@@ -486,30 +211,6 @@ double likeliest_delay_s(const Problem& problem, const Fit& prompt, double low_s
     if (sum < least) least = sum, out_s = delay_s;
   }
   return out_s;
-}
-
-/// Where a log's own coordinates stand.
-Eigen::Index initial_of(const Problem& problem, const Fit& f, std::size_t log) {
-  Eigen::Index at = f.x.size();
-  for (std::size_t l = problem.logs.size(); l-- > log;) at -= own_count(problem.logs[l]);
-  return at;
-}
-
-/// And what is said there of what was before it; nothing where it does not begin warm.
-Eigen::Index before_of(const Problem& problem, const Fit& f, std::size_t log) {
-  const Bins& bins = problem.logs[log];
-  return initial_of(problem, f, log) + own_count(bins) - (bins.begins_warm ? before_count : 0);
-}
-
-std::vector<Initial<double>> initial_states(const Problem& problem, const Fit& f, std::size_t log) {
-  const auto model = model_of(problem, f, log);
-  std::vector<Initial<double>> out;
-  Eigen::Index at = initial_of(problem, f, log);
-  for (const Start& start : problem.logs[log].starts) {
-    out.push_back(begin_at(model, problem.logs[log], start, f.x[at], f.x[at + 1]));
-    at += per_start_count;
-  }
-  return out;
 }
 
 /// Into x: base and initial coordinates of the first of `warm`, each cause's of the first of them that has it. Says
@@ -586,14 +287,6 @@ Fit lowest_valley(const Problem& problem, const std::vector<Chosen>& chosen, con
   }
   if (best.settled || !best.valid() || starts.size() == 1) return best;
   return descend_from(best.x, most);
-}
-
-double root_mean(double a, double na, double b, double nb) { return std::sqrt((a * a * na + b * b * nb) / (na + nb)); }
-
-Error joined(const Error& a, const Error& b) {
-  if (a.readings == 0) return b;
-  if (b.readings == 0) return a;
-  return {root_mean(a.rms_K, a.readings, b.rms_K, b.readings), std::max(a.worst_K, b.worst_K), a.readings + b.readings};
 }
 
 }  // namespace
@@ -690,7 +383,7 @@ Fit bare(const Problem& problem, const Fit& f) {
   out.x.resize(f.x.size() - f.cause_coordinates());
   out.x << f.x.head(base_count), f.x.tail(out.x.size() - base_count);
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    if (problem.logs[l].begins_warm) out.x.segment(before_of(problem, out, l), before_count).setZero();
+    if (problem.logs[l].begins_warm) out.x.segment(before_at(problem, out.x, l), before_count).setZero();
   }
   return out;
 }
@@ -743,104 +436,13 @@ Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f) {
     for (std::size_t s = 0; s < starts.size(); ++s) {
       if (s > 0 && std::isnan(starts[s].housing_degC) && std::isnan(starts[s].core_degC)) continue;
       const auto at = per_start_count * static_cast<Eigen::Index>(s);
-      out.x.segment(initial_of(whole, out, l) + at, per_start_count) =
-          f.x.segment(initial_of(fitted, f, l) + at, per_start_count);
+      out.x.segment(own_at(whole, out.x, l) + at, per_start_count) =
+          f.x.segment(own_at(fitted, f.x, l) + at, per_start_count);
     }
     if (whole.logs[l].begins_warm && fitted.logs[l].begins_warm)
-      out.x.segment(before_of(whole, out, l), before_count) = f.x.segment(before_of(fitted, f, l), before_count);
+      out.x.segment(before_at(whole, out.x, l), before_count) = f.x.segment(before_at(fitted, f.x, l), before_count);
   }
   return out;
-}
-
-Physical physical(const Eigen::VectorXd& x) { return {std::exp(x[0]), std::exp(x[1]), std::exp(x[2]), std::exp(x[3])}; }
-
-double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate) {
-  const Parameter& parameter = cause.parameters[static_cast<std::size_t>(p)];
-  return (parameter.logarithmic ? std::exp(coordinate) : coordinate) * problem.scale(parameter.scale, cause.drive);
-}
-
-Model<double> model_of(const Problem& problem, const Fit& f, std::size_t log) {
-  const double* before = problem.logs[log].begins_warm ? &f.x[before_of(problem, f, log)] : nullptr;
-  auto model = build<double>(problem, f.chosen, f.x.data(), before, log);
-  model.uneven_per_A2 = f.uneven_per_A2;
-  return model;
-}
-
-Replayed replayed(const Problem& problem, const Fit& f, std::size_t l) {
-  const Bins& log = problem.logs[l];
-  const auto model = model_of(problem, f, l);
-  Replayed out;
-  Whitener white =
-      log.has_housing ? Whitener::housing(problem.noise, log.width_s) : Whitener::core(problem.noise, log.width_s);
-  Foretold<double> foretold{0, 0};
-  replay<4>(model, log, initial_states(problem, f, l), [&](std::size_t k, double y2, const auto& winding) {
-    const Bin& bin = log.bins[k];
-    const double y1 = winding();
-    out.housing_degC.push_back(y2);
-    out.core_degC.push_back(y1);
-    out.housing_residual_K.push_back(bin.housing_degC - y2);
-    out.core_residual_K.push_back(bin.core_degC - y1);
-    double w = missing;
-    if (const double n = static_cast<double>(log.has_housing ? bin.housing_n : bin.core_n); n > 0) {
-      white.reading(n);
-      w = log.has_housing ? bin.housing_degC - y2 : bin.core_degC - y1;
-      foretold.whiten(white, w);
-    }
-    out.whitened.push_back(w);
-    white.step();
-    foretold.step(white);
-  });
-  return out;
-}
-
-double hottest_degC(const Problem& problem, const Fit& f, std::size_t l) {
-  const Bins& log = problem.logs[l];
-  auto part = model_of(problem, f, l);
-  const int hot = part.hot_node;
-  const auto initial = initial_states(problem, f, l);
-  double hottest = -1e300;
-  part.hot_node = -1;  // a reading is then of one node, not of both
-  for (const int node : {part.core, hot}) {
-    if (node < 0) continue;
-    part.core = node;
-    replay<4>(part, log, initial,
-              [&](std::size_t, double, const auto& winding) { hottest = std::max(hottest, winding()); });
-  }
-  return hottest;
-}
-
-Error error_of(const std::vector<double>& residual_K) {
-  double sum = 0, worst = 0;
-  int n = 0;
-  for (const double r : residual_K) {
-    if (std::isnan(r)) continue;
-    sum += r * r;
-    worst = std::max(worst, std::abs(r));
-    ++n;
-  }
-  return n > 0 ? Error{std::sqrt(sum / n), worst, n} : Error{missing, missing, 0};
-}
-
-double Rmse::judged_K() const { return std::isnan(core_K) ? housing_K : core_K; }
-
-Rmse rmse_of(const Problem& problem, const Fit& f, std::vector<Rmse>* each) {
-  Error housing{missing, missing, 0}, core{missing, missing, 0};
-  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
-    const Replayed r = replayed(problem, f, l);
-    const Error h = error_of(r.housing_residual_K), c = error_of(r.core_residual_K);
-    if (each != nullptr) each->push_back({h.rms_K, c.rms_K, h.worst_K, c.worst_K});
-    housing = joined(housing, h);
-    core = joined(core, c);
-  }
-  return {housing.rms_K, core.rms_K, housing.worst_K, core.worst_K};
-}
-
-double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
-                 Eigen::VectorXd* gradient) {
-  Evaluation e;
-  if (!evaluate_any(problem, Averaged(problem), chosen, x, e)) return 1e300;
-  if (gradient != nullptr) *gradient = e.gradient;
-  return e.misfit;
 }
 
 }  // namespace identify

@@ -1,27 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Fits the two-resistor model, with any causes added, to all logs of a problem at once.
 //
-// Levenberg-Marquardt on whitened residuals with exact sensitivities (dual.hpp), box bounds and weak priors.
-// Coordinates: ln R1, ln R2, ln C1, ln C2; the causes' parameters in units of their scale (or logarithm); for each log,
-// and again after each pause, the housing's initial temperature and the winding's excess over it; for each log that
-// begins warm then what it has behind it.
+// Levenberg-Marquardt on whitened residuals with exact sensitivities, box bounds and weak priors.
 #pragma once
 
 #include <Eigen/Dense>
 #include <vector>
 
-#include "identify/problem.hpp"
+#include "identify/coordinates.hpp"
 
 namespace identify {
 
-inline constexpr int base_count = 4, per_start_count = 2;
-/// What went on before a log that begins warm: as how far the housing moved a further mass and a late sensor show it,
-/// in shares of its rise within its time constant; and for how much of Problem::duration_s an ambient drifted.
-enum Before { mass_before, sensor_before, drift_before, before_count };
-
 struct Fit {
   std::vector<Chosen> chosen;
-  Eigen::VectorXd x;            // coordinates
+  Eigen::VectorXd x;            // coordinates.hpp
   Eigen::MatrixXd information;  // of data and prior (Gauss-Newton Hessian)
   Eigen::MatrixXd from_data;    // of the data alone
   Eigen::VectorXd gradient;     // of the cost: none but where a bound holds it back
@@ -76,47 +68,5 @@ Fit transferred(const Problem& other, const Fit& from);
 /// The same fit on the same logs, longer than it saw them: what begins after a pause there begins as its first readings
 /// say.
 Fit carried_on(const Problem& whole, const Problem& fitted, const Fit& f);
-
-/// What a fit simulates for one log: readings at every bin (also where nothing was measured) and the raw residuals.
-struct Replayed {
-  std::vector<double> housing_degC, core_degC;              // as the sensors would read
-  std::vector<double> housing_residual_K, core_residual_K;  // measured - simulated, NaN where nothing was measured
-  std::vector<double> whitened;  // residual of the housing (of a winding read alone), whitened, NaN likewise
-};
-Replayed replayed(const Problem& problem, const Fit& fit, std::size_t log);
-
-/// The most that any part of the winding becomes, degC.
-double hottest_degC(const Problem& problem, const Fit& fit, std::size_t log);
-
-/// Root mean square and worst of the residuals; NaN when there is no reading.
-struct Error {
-  double rms_K, worst_K;
-  int readings;
-};
-Error error_of(const std::vector<double>& residual_K);
-
-struct Rmse {
-  double housing_K = 0, core_K = 0;  // NaN: not measured
-  double housing_worst_K = 0, core_worst_K = 0;
-
-  double judged_K() const;  // the winding's where it is read
-};
-/// Errors over all logs, K; `each`: of every log as well.
-Rmse rmse_of(const Problem& problem, const Fit& fit, std::vector<Rmse>* each = nullptr);
-
-/// The base parameters in physical units.
-struct Physical {
-  double R1_K_per_W, R2_K_per_W, C1_J_per_K, C2_J_per_K;
-};
-Physical physical(const Eigen::VectorXd& x);
-
-/// Coordinates into physical units, for parameter p of a chosen cause.
-double parameter_value(const Problem& problem, const Cause& cause, int p, double coordinate);
-
-Model<double> model_of(const Problem& problem, const Fit& fit, std::size_t log);
-
-/// Misfit at given coordinates, and its gradient (tests compare it with differences of the former).
-double misfit_at(const Problem& problem, const std::vector<Chosen>& chosen, const Eigen::VectorXd& x,
-                 Eigen::VectorXd* gradient = nullptr);
 
 }  // namespace identify

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "identify/replayed.hpp"
 #include "identify/search.hpp"
 
 namespace identify {

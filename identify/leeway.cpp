@@ -6,6 +6,8 @@
 #include <numbers>
 #include <optional>
 
+#include "identify/replayed.hpp"
+
 namespace identify {
 namespace {
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "identify/replayed.hpp"
 #include "thermal/heat_names.hpp"
 
 namespace identify {

@@ -14,6 +14,7 @@
 #include "identify/impossible.hpp"
 #include "identify/parallel.hpp"
 #include "identify/pauses.hpp"
+#include "identify/replayed.hpp"
 #include "identify/units.hpp"
 
 namespace identify {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "identify/replayed.hpp"
 #include "identify/search.hpp"
 #include "identify/structure.hpp"
 

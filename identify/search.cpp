@@ -9,6 +9,7 @@
 #include "identify/disturbance.hpp"
 #include "identify/leeway.hpp"
 #include "identify/parallel.hpp"
+#include "identify/replayed.hpp"
 
 namespace identify {
 namespace {

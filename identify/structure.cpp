@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "identify/replayed.hpp"
+
 namespace identify {
 namespace {
 

@@ -6,7 +6,9 @@
 #include "identify/baseline.hpp"
 #include "identify/candidates.hpp"
 #include "identify/leeway.hpp"
+#include "identify/misfit.hpp"
 #include "identify/replay.hpp"
+#include "identify/replayed.hpp"
 #include "identify/structure.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench.hpp"
@@ -99,7 +101,8 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
     const Problem& problem = cause.needs == identify::Needs::logs_of_power ? by_power : by_current;
     const Eigen::Index own = identify::base_count + static_cast<Eigen::Index>(cause.parameters.size()),
                        n = own + starts * identify::per_start_count + before;
-    Eigen::VectorXd x(n), gradient;
+    const identify::Averaged averaged(problem);
+    Eigen::VectorXd x(n);
     x.head(4) << std::log(1.4), std::log(13.0), std::log(1.0), std::log(21.0);
     for (std::size_t p = 0; p < cause.parameters.size(); ++p) {
       const auto& parameter = cause.parameters[p];
@@ -109,7 +112,9 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
     }
     for (Eigen::Index s = 0; s < starts; ++s) x.segment(own + 2 * s, 2) << 24.5 + 5 * static_cast<double>(s), 0.3;
     x.tail(before).setConstant(0.05);
-    ASSERT_LT(identify::misfit_at(problem, chosen, x, &gradient), 1e200) << cause.id;
+    identify::Misfit at_x, above, below;
+    ASSERT_TRUE(identify::evaluate(problem, averaged, chosen, x, at_x)) << cause.id;
+    const Eigen::VectorXd& gradient = at_x.gradient;
     if (before > 0) {
       using enum identify::Edit;
       for (const auto& [edit, what] : {std::pair{mass, identify::mass_before},
@@ -128,8 +133,9 @@ void expect_exact_sensitivities(const Problem& by_current, const Problem& by_pow
       const double h = 1e-5;
       up[i] += h;
       down[i] -= h;
-      const double difference =
-          (identify::misfit_at(problem, chosen, up) - identify::misfit_at(problem, chosen, down)) / (2 * h);
+      ASSERT_TRUE(identify::evaluate(problem, averaged, chosen, up, above));
+      ASSERT_TRUE(identify::evaluate(problem, averaged, chosen, down, below));
+      const double difference = (above.sum - below.sum) / (2 * h);
       // A delay's slope is that of a line between bins, a difference across a bin's edge is not: looser there.
       const double loose = cause.edit == identify::Edit::delay || first_start ? 0.05 : 1e-5;
       EXPECT_NEAR(gradient[i], difference, loose * (std::abs(difference) + gradient.norm() * 1e-3) + 1e-4)

@@ -16,6 +16,7 @@
 #include "identify/held_out.hpp"
 #include "identify/leeway.hpp"
 #include "identify/problem.hpp"
+#include "identify/replayed.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
 

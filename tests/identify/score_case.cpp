@@ -10,6 +10,7 @@
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
 #include "identify/leeway.hpp"
+#include "identify/replayed.hpp"
 #include "identify/table.hpp"
 
 namespace tests {

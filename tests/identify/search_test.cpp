@@ -21,6 +21,7 @@
 #include "identify/leeway.hpp"
 #include "identify/model_file.hpp"
 #include "identify/parallel.hpp"
+#include "identify/replayed.hpp"
 #include "identify/table.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
