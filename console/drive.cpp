@@ -45,6 +45,20 @@ std::string fault_sentence(const wire::FaultEvidence& evidence) {
   return sentence;
 }
 
+void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
+  const wire::State state = console.session().state();
+  for (int a = 0; a < wire::axis_count; ++a) {
+    if ((mask >> a & 1) == 0 || state.axis[a].control == mode) continue;
+    const std::string command = fmt::format("mode {} --axis {}", wire::text_of(mode), a);
+    throw UserError(Exit::refused,
+                    fmt::format("Axis {} is in {} mode and takes no {}; {}.", a, wire::text_of(state.axis[a].control),
+                                unit_of(mode),
+                                console.options.sim ? "a board of --sim is gone with its process, so say '" + command +
+                                                          "' at the prompt of 'hotcore --sim', then this"
+                                                    : "say 'hotcore " + command + "' first"));
+  }
+}
+
 Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
              const std::function<void(const wire::State&, double)>& look) {
   const int first = (mask & 1) != 0 ? 0 : 1;

@@ -10,6 +10,11 @@
 
 namespace console {
 
+class Console;
+
+/// Before anything is armed: refuses a course whose unit an axis does not take, and names the command that helps.
+void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode);
+
 /// Armed axes. They are disarmed when this ends, also by an exception or Ctrl-C; a board that is gone lets go by itself
 /// (its setpoints grow old).
 class Armed {

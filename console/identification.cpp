@@ -115,6 +115,7 @@ void identify(Console& console, const Arguments& a) {
   wire::pc::need_new_file(log, a.force);
   Session& session = console.session();
   const int axis = a.axis == "1" ? 1 : 0;
+  need_mode(console, static_cast<std::uint8_t>(1 << axis), wire::ControlMode::current);
   const Values before = values_of(session, axis);
   const double rated_A = continuous_A(before);
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));

@@ -23,21 +23,6 @@ Json summary(const Driven& d) {
           {"limit", wire::text_of(d.limit).name}};
 }
 
-/// Before anything is armed: a course whose unit an axis does not take. Names the command that helps.
-void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
-  const wire::State state = console.session().state();
-  for (int a = 0; a < wire::axis_count; ++a) {
-    if ((mask >> a & 1) == 0 || state.axis[a].control == mode) continue;
-    const std::string command = fmt::format("mode {} --axis {}", wire::text_of(mode), a);
-    throw UserError(Exit::refused,
-                    fmt::format("Axis {} is in {} mode and takes no {}; {}.", a, wire::text_of(state.axis[a].control),
-                                unit_of(mode),
-                                console.options.sim ? "a board of --sim is gone with its process, so say '" + command +
-                                                          "' at the prompt of 'hotcore --sim', then this"
-                                                    : "say 'hotcore " + command + "' first"));
-  }
-}
-
 /// `once_armed`: told when the first setpoint was taken.
 void play(Console& console, const std::string& axis, const std::vector<Piece>& profile,
           const std::string& once_armed = "") {

@@ -118,8 +118,7 @@ struct Segment {
 };
 struct Ask {
   std::uint8_t axis;
-  std::uint8_t standing =
-      0;  // 0: it turns, all phases share; 1: wherever it stands, each phase as if it were the hottest
+  std::uint8_t standing = 1;  // wherever it stands, each phase as if it were the hottest; 0: it turns, all phases share
   std::uint16_t zero = 0;
 };
 inline constexpr int max_segments = 16;

@@ -140,6 +140,7 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   refused("run \"20A 1s\" --axis 1", 8,
           "Axis 1 is in torque mode and takes no A; a board of --sim is gone with its process, so say "
           "'mode current --axis 1' at the prompt of 'hotcore --sim', then this.");
+  refused("identify --axis 1 --out " + path("torque"), 8, "Axis 1 is in torque mode and takes no A");
   refused("run \"1Nm 1s\"", 8, "Axis 0 is in current mode and takes no N m");
   refused("arm --torque 0.01 --axis both", 8, "'mode torque --axis 0'");
   EXPECT_EQ(board_->armed, 0);
