@@ -69,8 +69,10 @@ const std::vector<Cause>& causes() {
            Edit::coefficient, Needs::copper, {{"alpha", "1/K", Scale::one, 0, 0.009, 0.002, false, 0.00393}},
            "the copper heat grows otherwise with temperature than copper does",
            "natural_convection, bridge_loss, constant_heat", "a long hot stall; or voltage over current, cold and hot"),
-      heat("bridge_loss", "heat in proportion to current (dead time, switching, brushes) in the winding", winding,
-           Drive::current_A, Needs::current, "V", 10, "too much heat at low current",
+      heat("bridge_loss",
+           "heat in proportion to current (dead time, switching, brushes; or a current read at the supply) in the "
+           "winding",
+           winding, Drive::current_A, Needs::current, "V", 10, "too much heat at low current",
            "current_offset, copper_coefficient", "hold low and high currents of both signs"),
       heat("enabled_loss", "constant heat in the winding while the bridge switches (ripple current)", winding,
            Drive::enabled, Needs::current, "W", 10, "the winding is warm whenever the drive is enabled, load or not",
