@@ -10,18 +10,12 @@
 // Does not know what the columns mean (log.hpp does).
 #pragma once
 
-#include <limits>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "identify/cell.hpp"
+
 namespace identify {
-
-inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-
-/// Without blanks, tabs and carriage returns at its ends.
-std::string_view trimmed(std::string_view s);
-std::string in_small(std::string_view s);  // of the letters A to Z
 
 /// How many cells are not missing; and the largest of these without its sign, 0 of none.
 std::size_t count_told(const std::vector<double>& cells);

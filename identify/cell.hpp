@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// What one cell of a table says: a number, a moment, nothing.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+
+namespace identify {
+
+inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+/// Without blanks, tabs and carriage returns at its ends.
+std::string_view trimmed(std::string_view s);
+std::string in_small(std::string_view s);  // of the letters A to Z
+
+bool means_missing(std::string_view s);
+
+/// A cell as a number; false when it is neither a number nor a word for "missing". An infinite value counts as missing,
+/// a date and time as s since 1970, a time of day or a duration as s.
+bool number_in(std::string_view s, bool decimal_comma, double& value);
+/// A number with a unit behind it, as dashboards export them: 22.9 °C.
+bool number_and_unit_in(std::string_view cell, bool decimal_comma, double& value, std::string& unit);
+
+/// A time without a date, as s since midnight; or what a stopwatch shows.
+bool time_of_day(std::string_view s, double& value);
+/// Perhaps a date or a time, in no form that is read.
+bool like_a_moment(std::string_view s);
+
+}  // namespace identify
