@@ -43,15 +43,16 @@ class Rotor {
   /// mechanical_rad within [0, 2 pi].
   RotorAngle follow(float mechanical_rad, std::uint32_t periods) {
     const std::uint32_t measured = quarters_of(mechanical_rad);
+    const std::uint32_t expected = tracked_ + whole(rad_per_s_ * turn32_per_speed_) * periods;
+    const float error = static_cast<float>(static_cast<std::int32_t>(measured - expected));
     if (periods == 1) {
-      const std::uint32_t expected = tracked_ + whole(rad_per_s_ * turn32_per_speed_);
-      const float error = static_cast<float>(static_cast<std::int32_t>(measured - expected));
       tracked_ = expected + whole(angle_gain_ * error);
       rad_per_s_ += speed_gain_ * error;
-      if (!within(rad_per_s_, max_rad_per_s_)) rad_per_s_ = rad_per_s_ > 0.0f ? max_rad_per_s_ : -max_rad_per_s_;
-    } else {
-      tracked_ = measured;  // after a gap the speed stands, the angle starts anew
+    } else {  // the angle starts anew; the speed follows its mean over the gap, or it would stand where gaps never end
+      tracked_ = measured;
+      rad_per_s_ += angle_gain_ * error / (turn32_per_speed_ * static_cast<float>(periods));
     }
+    if (!within(rad_per_s_, max_rad_per_s_)) rad_per_s_ = rad_per_s_ > 0.0f ? max_rad_per_s_ : -max_rad_per_s_;
     const std::uint32_t electrical = measured * pole_pairs_ - offset_;
     return {{electrical}, {electrical + whole(rad_per_s_ * ahead_per_speed_)}};
   }

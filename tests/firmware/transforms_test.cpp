@@ -136,6 +136,24 @@ TEST(Rotor, KeepsItsSpeedOverAGap) {
   EXPECT_NEAR(rotor.rad_per_s(), 1000.0, 2.0);
 }
 
+/// Every second sample refused, or every third period all that an interrupt in distress can take.
+TEST(Rotor, SeesTheSpeedThoughEverySampleFollowsAGap) {
+  for (const std::uint32_t periods : {2u, 3u, 20u}) {
+    firmware::Rotor rotor(bench::parameters(), bench::rating);
+    double mechanical = 0.0, rad_per_s = 0.0;
+    const auto go_on = [&](double goal_rad_per_s) {
+      for (int i = 0; i < 2000; ++i) {
+        rad_per_s += 0.01 * (goal_rad_per_s - rad_per_s);
+        mechanical += rad_per_s * bench::period_s * periods;
+        (void)rotor.follow(static_cast<float>(wrapped(mechanical)), periods);
+      }
+      EXPECT_NEAR(rotor.rad_per_s(), goal_rad_per_s, 1.0) << periods;
+    };
+    go_on(1500.0);
+    go_on(-1500.0);
+  }
+}
+
 TEST(Rotor, NoEncoderGarbageMakesTheSpeedRunAway) {
   firmware::Rotor rotor(bench::parameters(), bench::rating);
   std::mt19937 random(3);
