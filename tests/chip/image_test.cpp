@@ -179,6 +179,59 @@ TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
   }
 }
 
+/// Both rotors locked at this part of an electrical turn, away from the index; powered on with these parameters.
+std::unique_ptr<Pcb> standing_between_two_switches(double electrical_turns, const firmware::AxisSet (&setup)[2]) {
+  auto pcb = std::make_unique<Pcb>(design_of({}), 1);
+  pcb->flash_image(image);
+  pcb->flash_parameters(setup);
+  for (int i = 0; i < 2; ++i) {
+    pcb->bench.load(i).mode = host_sim::Load::Mode::locked;
+    pcb->bench.motor(i).place(electrical_turns * 2 * host_sim::pi / pcb->bench.motor(i).design().pole_pairs, 0);
+  }
+  pcb->power_on();
+  return pcb;
+}
+
+/// Most of the current is torque, in the direction asked for: a Hall sector is 60 degrees wide.
+void expect_torque(Pcb& pcb) {
+  ASSERT_TRUE(pcb.arm());
+  hold(pcb, 4.0f, 4.0f, 0.05);
+  for (int i = 0; i < 2; ++i) EXPECT_GT(pcb.bench.truth(i).current_q_A, 4.0 * 0.866 - 0.4);
+  NO_TROUBLE(pcb);
+}
+
+// Hall switches are mounted to the magnet, the index anywhere: its offset must not turn the field of a start on them.
+TEST(Image, AStartOnTheHallSensorsDoesNotDependOnWhereTheIndexIs) {
+  NEEDS_IMAGE(image);
+  for (const float offset_rad : {-3.1f, 1.0f, 3.1f}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    for (auto& s : setup) s.drive.angle_offset_rad = offset_rad;
+    for (const double electrical_turns : {0.05, 0.70}) {
+      SCOPED_TRACE(testing::Message() << offset_rad << " rad, at " << electrical_turns);
+      expect_torque(*standing_between_two_switches(electrical_turns, setup));
+    }
+  }
+}
+
+TEST(Image, ACommitOfPolePairsOrOffsetFindsARotorOnItsHallSensorsAnew) {
+  NEEDS_IMAGE(image);
+  for (const float first_pole_pairs : {1.0f, 5.0f}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    for (auto& s : setup) s.drive.pole_pairs_count = first_pole_pairs;
+    auto pcb = standing_between_two_switches(0.47, setup);
+    pcb->run_for(0.3);
+    for (const auto axis : {std::uint8_t{0}, std::uint8_t{1}}) {
+      ASSERT_EQ(pcb->order(h8_15d::order_stage, {{0x0105, axis}, 2.0f}).status, 0);
+      ASSERT_EQ(pcb->order(h8_15d::order_stage, {{0x0106, axis}, 2.5f}).status, 0);
+    }
+    ASSERT_EQ(pcb->order(h8_15d::order_commit).status, 0);
+    SCOPED_TRACE(first_pole_pairs);
+    expect_torque(*pcb);
+  }
+}
+
 TEST(Image, RefusesToArmWithoutParameters) {
   NEEDS_IMAGE(image);
   Options o;
