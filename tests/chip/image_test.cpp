@@ -232,6 +232,36 @@ TEST(Image, ACommitOfPolePairsOrOffsetFindsARotorOnItsHallSensorsAnew) {
   }
 }
 
+// The Hall switches tell one pole pair from the other as little as they tell where in a sector: the first index moves
+// the rotor's angle by up to half a turn. That is no movement, and the current must not feel it as one.
+TEST(Image, TheFirstIndexAfterAStartOnTheHallSensorsIsNoMovement) {
+  NEEDS_IMAGE(image);
+  for (const double turns : {0.97, 0.47}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    auto pcb = standing_between_two_switches(2 * turns, setup);
+    ASSERT_TRUE(pcb->arm());
+    hold(*pcb, 4.0f, 4.0f, 0.02);
+    for (int i = 0; i < 2; ++i) {
+      pcb->bench.load(i).mode = host_sim::Load::Mode::imposed_speed;
+      pcb->bench.load(i).speed_rad_per_s = 100;
+    }
+    double most_A = 0;
+    for (int k = 0; k < 4000; ++k) {  // 100 ms: past the index
+      for (int i = 0; i < 2 && k % 400 == 0; ++i) pcb->set_current(i, 0.0f, 4.0f);
+      pcb->run_for(25e-6);
+      for (int i : {0, 1}) {
+        const auto truth = pcb->bench.truth(i);
+        most_A = std::max(most_A, std::hypot(truth.current_d_A, truth.current_q_A));
+      }
+    }
+    std::printf("from %.2f turns: most current %.1f A\n", turns, most_A);
+    EXPECT_LT(most_A, 8.0) << turns;  // the field moves by up to half a sector
+    for (int i : {0, 1}) EXPECT_EQ(pcb->door().axis[i].mode, firmware::Mode::running);
+    NO_TROUBLE(*pcb);
+  }
+}
+
 TEST(Image, RefusesToArmWithoutParameters) {
   NEEDS_IMAGE(image);
   Options o;
