@@ -114,7 +114,7 @@ void Commands::answer(const wire::Frame& request, bool parameters_free, Reply& r
   const auto kind = static_cast<Kind>(request.kind);
   switch (kind) {
     case Kind::hello:
-      if (parameters_free) (void)parameters_.load(wire::LoadFrom::in_force);
+      if (parameters_free) parameters_.take_back();
       return hello(reply);
     case Kind::describe_parameter:
       return describe_parameter(head_of<wire::Index>(request).index, reply);
