@@ -17,7 +17,8 @@ constexpr float blind_share = 0.6f;    // of the continuous current, while no ho
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
-constexpr float towards_hot = 1.005f;  // mostly, what samples do not show is known to half a percent (losses_test)
+constexpr float contradiction_A = 1.0f;  // of three sensors: gains apart by 5 % at the peak; noise is a tenth of it
+constexpr float towards_hot = 1.005f;    // mostly, what samples do not show is known to half a percent (losses_test)
 
 bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
 
@@ -157,6 +158,20 @@ inline void Axis::add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t per
   sums.phase_A2.b += phase_A.b * phase_A.b;
   sums.phase_A2.c += phase_A.c * phase_A.c;
   sums.periods += 1;
+  const float sum_A = phase_A.a + phase_A.b + phase_A.c;
+  if (!within(sum_A, contradiction_A)) [[unlikely]]
+    add_contradicted(sums, phase_A, sum_A);
+}
+
+/// Three currents of a star have no sum, so one sensor lies, and nobody knows which: each phase as hot as its own
+/// sensor or the other two say. A phase whose sensor is dead would carry three times what is asked for, and seem cold.
+void Axis::add_contradicted(HeatSums& sums, const Abc& phase_A, float sum_A) {
+  const auto more_A2 = [sum_A](float own_A) {
+    const float others_A = own_A - sum_A;
+    return std::fmax(others_A * others_A - own_A * own_A, 0.0f);
+  };
+  sums.phase_A2 = {sums.phase_A2.a + more_A2(phase_A.a), sums.phase_A2.b + more_A2(phase_A.b),
+                   sums.phase_A2.c + more_A2(phase_A.c)};
 }
 
 /// A tenth above the last current, and at its peak in every phase: nobody saw where the rotor went.

@@ -603,6 +603,24 @@ TEST(Axis, WhatFlowsThroughTheDiodesBesideARefusedSampleHeats) {
     EXPECT_GT(after_current(200, sample)->axis(0).core().estimate().hottest_degC(), admitted_degC - 0.5);
 }
 
+/// The loop drives three times the current through a phase that seems to carry none.
+TEST(Axis, APhaseWhoseSensorIsDeadIsNoColderThanItIs) {
+  for (const float gain : {0.0f, 0.5f}) {
+    Rig rig;
+    rig.bring_up();
+    rig.motor.angle_rad = 0.5;  // of two pole pairs: most of the current is that of phase a
+    for (int i = 0; i < 4000; ++i) {
+      ASSERT_EQ(rig.axis().set_current({0.0f, 5.0f}), Status::done);
+      rig.spoilt([&](hal::AxisSample& s) { s.current_A.a *= gain; });
+      if (rig.ticks % 200 == 0) rig.driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    }
+    ASSERT_EQ(rig.axis().mode(), Mode::running);
+    const float a_A = rig.motor.phases().a;
+    EXPECT_GT(std::fabs(a_A), 1.1f * 5.0f) << gain;
+    EXPECT_GE(rig.axis().core().input()[thermal::Drive::phase_a_A2], static_cast<double>(0.98f * a_A * a_A)) << gain;
+  }
+}
+
 TEST(Axis, AStalledMotorIsHeldByItsCoreLimitBelowIt) {
   // A winding as small as an EC 16's: 20 A would take it through its limit in half a second.
   wire::Motor small = bench::motor();
