@@ -81,28 +81,24 @@ void Application::remember() {
   keeper_.keep(driver_.memory());
 }
 
-/// Where the rotor stands before the first index pulse: on the pulse itself, or somewhere in a Hall sector.
+/// Where the rotor stands before the first index pulse: somewhere in a Hall sector, or on the pulse itself.
 void Application::find_rotor(int axis) {
   const std::uint32_t counter = reg((axis == 0 ? tim::tim3 : tim::tim4) + tim::cnt);
   const firmware::AxisParameters& p = parameters_.in_force().axes[axis].drive;
   stage_.distrust_encoder(axis);
-  if (read_pin(pins[axis].index)) {
-    stage_.set_encoder_zero(axis, counter);
-    index_seen_[axis] = true;
-    stage_.trust_encoder(axis);
-    return;
-  }
   std::uint32_t hall = 0;
   for (int k = 0; k < 3; ++k) hall |= static_cast<std::uint32_t>(read_pin(pins[axis].hall[k])) << k;
   // Switch k is high for half an electrical turn from 120 k degrees: six sectors; here the middle of each, in turns.
   constexpr float middle_turns[8] = {-1.0f, 1.5f / 6, 3.5f / 6, 2.5f / 6, 5.5f / 6, 0.5f / 6, 4.5f / 6, -1.0f};
   // The switches tell where the magnet is; what the encoder has to read there is its offset more.
   const float turns = (middle_turns[hall] + p.angle_offset_rad * (0.5f / 3.1415927f)) / p.pole_pairs_count;
-  if (middle_turns[hall] < 0.0f || !(turns > -1.0f && turns < 2.0f))
-    return;  // no such sector, or no such parameters: the axis refuses to arm
-  const auto counts = static_cast<std::int32_t>(turns * static_cast<float>(encoder_counts));
-  stage_.set_encoder_zero(axis, counter - static_cast<std::uint32_t>(counts));
-  stage_.trust_encoder(axis);
+  on_hall_[axis] = middle_turns[hall] >= 0.0f && turns > -1.0f && turns < 2.0f;
+  if (on_hall_[axis]) {
+    const auto counts = static_cast<std::int32_t>(turns * static_cast<float>(encoder_counts));
+    stage_.set_encoder_zero(axis, counter - static_cast<std::uint32_t>(counts));
+    stage_.trust_encoder(axis);
+  }  // else no such sector, or no such parameters: without an index the axis refuses to arm
+  if (read_pin(pins[axis].index)) index(axis);
 }
 
 /// A commit may bring other pole pairs or another offset, and with them another place of a rotor whose index was not
@@ -137,12 +133,25 @@ void Application::control() {
   }
 }
 
+/// The first index moves the field by half a sector at most, and as much again for how the switches are mounted. What
+/// asks for more is a glitch on the line, or an offset that is another motor's, and would turn the field anywhere.
+bool Application::agrees_with_hall(int axis, std::uint32_t slipped) const {
+  constexpr std::uint32_t sector = encoder_counts / 6;
+  const auto pole_pairs = static_cast<std::uint32_t>(parameters_.in_force().axes[axis].drive.pole_pairs_count);
+  const std::uint32_t electrical = slipped * pole_pairs & (encoder_counts - 1);
+  return electrical <= sector || electrical >= encoder_counts - sector;
+}
+
 void Application::index(int axis) {
   const std::uint32_t counter = reg((axis == 0 ? tim::tim3 : tim::tim4) + tim::cnt);
   const std::uint32_t slipped = (counter - stage_.encoder_zero(axis)) & (encoder_counts - 1);
   constexpr std::uint32_t tolerance = 4;  // latency of this interrupt at 1000 rad/s, and which flank of the pulse
   if (index_seen_[axis] && slipped > tolerance && slipped < encoder_counts - tolerance) {
     stage_.distrust_encoder(axis);  // counts were lost or invented since the last turn
+    return;
+  }
+  if (!index_seen_[axis] && on_hall_[axis] && !agrees_with_hall(axis, slipped)) {
+    stage_.distrust_encoder(axis);
     return;
   }
   if (!index_seen_[axis]) stage_.set_encoder_zero(axis, counter);

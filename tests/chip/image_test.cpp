@@ -262,6 +262,39 @@ TEST(Image, TheFirstIndexAfterAStartOnTheHallSensorsIsNoMovement) {
   }
 }
 
+// A glitch before the first index, or an offset that is another motor's: either would turn the field anywhere.
+TEST(Image, AnIndexThatTheHallSensorsContradictIsNotBelieved) {
+  NEEDS_IMAGE(image);
+  firmware::AxisSet setup[2];
+  setup_of({}, setup);
+  auto pcb = standing_between_two_switches(0.55, setup);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  for (int i : {0, 1}) {
+    const h8_15d::Pin index = h8_15d::pins[i].index;
+    auto& counter = i == 0 ? pcb->chip.tim3 : pcb->chip.tim4;
+    counter.set_index_edges(pcb->bench.raw(i).encoder_counts);  // a glitch here and now, and not where the index is
+    pcb->chip.set_pin({index.port, index.number}, true);
+    pcb->chip.set_pin({index.port, index.number}, false);
+  }
+  double worst_A = 4.0;
+  for (int k = 0; k < 20; ++k) {
+    pcb->run_for(1e-3);
+    for (int i : {0, 1}) worst_A = std::min(worst_A, pcb->bench.truth(i).current_q_A);
+  }
+  EXPECT_GT(worst_A, -0.5) << "torque the wrong way";
+  for (int i : {0, 1}) EXPECT_EQ(pcb->door().axis[i].fault.fault, wire::Fault::invalid_sample);
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, ARotorOnAnIndexThatTheHallSensorsContradictIsNotArmed) {
+  NEEDS_IMAGE(image);
+  firmware::AxisSet setup[2];
+  setup_of({}, setup);
+  for (auto& s : setup) s.drive.angle_offset_rad = 2.5f;  // the bench's index is where the magnet lies on phase a
+  EXPECT_FALSE(standing_between_two_switches(0.0, setup)->arm(0.3));
+}
+
 TEST(Image, RefusesToArmWithoutParameters) {
   NEEDS_IMAGE(image);
   Options o;
