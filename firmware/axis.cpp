@@ -266,6 +266,7 @@ wire::Status Axis::against(wire::ControlMode mode) const {
 
 wire::Status Axis::clear() {
   if (!setpoint_.is_zero()) return wire::Status::setpoint_not_zero;
+  if (fault_.fault == wire::Fault::parameters) return wire::Status::parameter_refused;  // only another set clears it
   post(Command::clear);
   return wire::Status::done;
 }

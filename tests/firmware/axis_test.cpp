@@ -807,7 +807,7 @@ TEST(Axis, AContradictorySetTripsAndCannotBeCleared) {
     EXPECT_EQ(rig.axis().mode(), Mode::tripped);
     EXPECT_EQ(rig.axis().fault().fault, Fault::parameters);
     EXPECT_EQ(rig.axis().fault().threshold, id);
-    (void)rig.axis().clear();
+    EXPECT_EQ(rig.axis().clear(), Status::parameter_refused) << "or a person is told that it is cleared";
     rig.run(300);
     EXPECT_EQ(rig.axis().mode(), Mode::tripped);
     (void)rig.axis().arm();
