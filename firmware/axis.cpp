@@ -158,20 +158,6 @@ inline void Axis::add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t per
   sums.phase_A2.b += phase_A.b * phase_A.b;
   sums.phase_A2.c += phase_A.c * phase_A.c;
   sums.periods += 1;
-  const float sum_A = phase_A.a + phase_A.b + phase_A.c;
-  if (!within(sum_A, contradiction_A)) [[unlikely]]
-    add_contradicted(sums, phase_A, sum_A);
-}
-
-/// Three currents of a star have no sum, so one sensor lies, and nobody knows which: each phase as hot as its own
-/// sensor or the other two say. A phase whose sensor is dead would carry three times what is asked for, and seem cold.
-void Axis::add_contradicted(HeatSums& sums, const Abc& phase_A, float sum_A) {
-  const auto more_A2 = [sum_A](float own_A) {
-    const float others_A = own_A - sum_A;
-    return std::fmax(others_A * others_A - own_A * own_A, 0.0f);
-  };
-  sums.phase_A2 = {sums.phase_A2.a + more_A2(phase_A.a), sums.phase_A2.b + more_A2(phase_A.b),
-                   sums.phase_A2.c + more_A2(phase_A.c)};
 }
 
 /// A tenth above the last current, and at its peak in every phase: nobody saw where the rotor went.
@@ -350,6 +336,19 @@ thermal::Unseen Axis::unseen_now() const {
   return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 
+/// Three currents of a star have no sum, so where they have one a sensor lies, and nobody knows which: each phase as
+/// hot as its own sensor or the other two say, of the last sample for the whole step. A phase whose sensor is dead
+/// would carry three times what is asked for, and seem cold.
+void Axis::add_contradicted(float (&phase_A2)[3]) const {
+  const float own_A[3] = {trace_.phase_A.a, trace_.phase_A.b, trace_.phase_A.c};
+  const float sum_A = own_A[0] + own_A[1] + own_A[2];
+  if (within(sum_A, contradiction_A)) return;
+  for (int k = 0; k < 3; ++k) {
+    const float others_A = own_A[k] - sum_A, more_A2 = others_A * others_A - own_A[k] * own_A[k];
+    if (more_A2 > 0.0f) phase_A2[k] += more_A2;
+  }
+}
+
 /// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
 /// on before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
@@ -361,7 +360,8 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
     unseen_ = mode_ == Mode::running ? unseen_now() : thermal::Unseen{};
-    const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    add_contradicted(phase_A2);
     // What a sample misses of the mean goes with the phase's own current, ripple through all of them.
     const float all_A2 = phase_A2[0] + phase_A2[1] + phase_A2[2];
     const float missed = all_A2 > 0.0f ? 1.5f * unseen_.of_mean_A2 / all_A2 : 0.0f;

@@ -6,9 +6,7 @@
 //
 // The angle is taken as measured; only the speed is observed (a tracking loop with both poles at 1/(1 + w T)), because
 // a filtered angle would lag by acceleration / w^2, which for a small motor pushed hard is a large part of a radian.
-// Half an electrical turn beside what was expected is no movement but an encoder that has found its index, and leaves
-// the speed alone; twice in a row it is the speed that was wrong. Else it does not judge its input (the guard did).
-// Same cost every call, ISR.
+// Does not judge its input (the guard did). Same cost every call, ISR.
 #pragma once
 
 #include <cstdint>
@@ -39,26 +37,21 @@ class Rotor {
     ahead_per_speed_ = turn32_per_speed_ * hal::output_delay_periods * p.pole_pairs_count;
     // A quarter of an electrical turn per period: beyond it there is no sine left to modulate, and 1.5 periods of it
     // still fit into half a turn.
-    most_turn32_ = 2147483648.0f / p.pole_pairs_count;
     max_rad_per_s_ = 0.5f * pi * rating.pwm_Hz / p.pole_pairs_count;
   }
 
   /// mechanical_rad within [0, 2 pi].
   RotorAngle follow(float mechanical_rad, std::uint32_t periods) {
     const std::uint32_t measured = quarters_of(mechanical_rad);
-    const std::uint32_t expected = tracked_ + whole(rad_per_s_ * turn32_per_speed_) * periods;
-    const float error = static_cast<float>(static_cast<std::int32_t>(measured - expected));
-    jumped_ = !within(error, most_turn32_) && !jumped_;
-    if (jumped_) {
-      tracked_ = measured;
-    } else if (periods == 1) {
+    if (periods == 1) {
+      const std::uint32_t expected = tracked_ + whole(rad_per_s_ * turn32_per_speed_);
+      const float error = static_cast<float>(static_cast<std::int32_t>(measured - expected));
       tracked_ = expected + whole(angle_gain_ * error);
       rad_per_s_ += speed_gain_ * error;
-    } else {  // the angle starts anew; the speed follows its mean over the gap, or it would stand where gaps never end
-      tracked_ = measured;
-      rad_per_s_ += angle_gain_ * error / (turn32_per_speed_ * static_cast<float>(periods));
+      if (!within(rad_per_s_, max_rad_per_s_)) rad_per_s_ = rad_per_s_ > 0.0f ? max_rad_per_s_ : -max_rad_per_s_;
+    } else {
+      tracked_ = measured;  // after a gap the speed stands, the angle starts anew
     }
-    if (!within(rad_per_s_, max_rad_per_s_)) rad_per_s_ = rad_per_s_ > 0.0f ? max_rad_per_s_ : -max_rad_per_s_;
     const std::uint32_t electrical = measured * pole_pairs_ - offset_;
     return {{electrical}, {electrical + whole(rad_per_s_ * ahead_per_speed_)}};
   }
@@ -86,8 +79,6 @@ class Rotor {
   float angle_gain_ = 0.0f, speed_gain_ = 0.0f;
   float turn32_per_speed_ = 0.0f, ahead_per_speed_ = 0.0f;
   float max_rad_per_s_ = 0.0f;
-  float most_turn32_ = 0.0f;  // half an electrical turn
-  bool jumped_ = false;
   std::uint32_t tracked_ = 0;
   float rad_per_s_ = 0.0f;
 };

@@ -136,48 +136,6 @@ TEST(Rotor, KeepsItsSpeedOverAGap) {
   EXPECT_NEAR(rotor.rad_per_s(), 1000.0, 2.0);
 }
 
-/// Every second sample refused, or every third period all that an interrupt in distress can take.
-TEST(Rotor, SeesTheSpeedThoughEverySampleFollowsAGap) {
-  for (const std::uint32_t periods : {2u, 3u, 20u}) {
-    firmware::Rotor rotor(bench::parameters(), bench::rating);
-    double mechanical = 0.0, rad_per_s = 0.0;
-    const auto go_on = [&](double goal_rad_per_s) {
-      for (int i = 0; i < 2000; ++i) {
-        rad_per_s += 0.01 * (goal_rad_per_s - rad_per_s);
-        mechanical += rad_per_s * bench::period_s * periods;
-        (void)rotor.follow(static_cast<float>(wrapped(mechanical)), periods);
-      }
-      EXPECT_NEAR(rotor.rad_per_s(), goal_rad_per_s, 1.0) << periods;
-    };
-    go_on(1500.0);
-    go_on(-1500.0);
-  }
-}
-
-// The first index behind a start on Hall switches, which tell no pole pair from the other.
-TEST(Rotor, AnEncoderThatIsSetAnewHasNotMoved) {
-  for (const double pole_pairs : {2.0, 7.0}) {
-    firmware::AxisParameters p = bench::parameters();
-    p.pole_pairs_count = static_cast<float>(pole_pairs);
-    firmware::Rotor rotor(p, bench::rating);
-    double mechanical = 0.0;
-    const auto go = [&] {
-      mechanical += 100.0 * bench::period_s;
-      return rotor.follow(static_cast<float>(wrapped(mechanical)), 1);
-    };
-    for (int i = 0; i < 2000; ++i) (void)go();
-    for (const double jump : {1.0, -1.0}) {
-      mechanical += jump * 2 * M_PI / pole_pairs;
-      const firmware::RotorAngle seen = go();
-      EXPECT_LT(distance(seen.at_sample, pole_pairs * mechanical), 1e-4);
-      for (int i = 0; i < 200; ++i) {
-        (void)go();
-        ASSERT_NEAR(rotor.rad_per_s(), 100.0, 1.0) << pole_pairs << ' ' << i;
-      }
-    }
-  }
-}
-
 TEST(Rotor, NoEncoderGarbageMakesTheSpeedRunAway) {
   firmware::Rotor rotor(bench::parameters(), bench::rating);
   std::mt19937 random(3);
