@@ -17,7 +17,8 @@ constexpr float blind_share = 0.6f;    // of the continuous current, while no ho
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
-constexpr float towards_hot = 1.005f;  // mostly, what samples do not show is known to half a percent (losses_test)
+constexpr float contradiction_A = 1.0f;  // of three sensors: gains apart by 5 % at the peak; noise is a tenth of it
+constexpr float towards_hot = 1.005f;    // mostly, what samples do not show is known to half a percent (losses_test)
 
 bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
 
@@ -251,6 +252,7 @@ wire::Status Axis::against(wire::ControlMode mode) const {
 
 wire::Status Axis::clear() {
   if (!setpoint_.is_zero()) return wire::Status::setpoint_not_zero;
+  if (fault_.fault == wire::Fault::parameters) return wire::Status::parameter_refused;  // only another set clears it
   post(Command::clear);
   return wire::Status::done;
 }
@@ -334,6 +336,19 @@ thermal::Unseen Axis::unseen_now() const {
   return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 
+/// Three currents of a star have no sum, so where they have one a sensor lies, and nobody knows which: each phase as
+/// hot as its own sensor or the other two say, of the last sample for the whole step. A phase whose sensor is dead
+/// would carry three times what is asked for, and seem cold.
+void Axis::add_contradicted(float (&phase_A2)[3]) const {
+  const float own_A[3] = {trace_.phase_A.a, trace_.phase_A.b, trace_.phase_A.c};
+  const float sum_A = own_A[0] + own_A[1] + own_A[2];
+  if (within(sum_A, contradiction_A)) return;
+  for (int k = 0; k < 3; ++k) {
+    const float others_A = own_A[k] - sum_A, more_A2 = others_A * others_A - own_A[k] * own_A[k];
+    if (more_A2 > 0.0f) phase_A2[k] += more_A2;
+  }
+}
+
 /// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
 /// on before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
@@ -345,7 +360,8 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
     unseen_ = mode_ == Mode::running ? unseen_now() : thermal::Unseen{};
-    const float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+    add_contradicted(phase_A2);
     // What a sample misses of the mean goes with the phase's own current, ripple through all of them.
     const float all_A2 = phase_A2[0] + phase_A2[1] + phase_A2[2];
     const float missed = all_A2 > 0.0f ? 1.5f * unseen_.of_mean_A2 / all_A2 : 0.0f;

@@ -178,6 +178,7 @@ class Axis {
   void cleared();
   void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
+  void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   thermal::Unseen unseen_now() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);

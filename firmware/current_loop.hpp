@@ -22,8 +22,8 @@ class CurrentLoop {
     kp_d_V_per_A_ = p.inductance_d_H * bandwidth_rad_per_s;
     kp_q_V_per_A_ = p.inductance_q_H * bandwidth_rad_per_s;
     ki_V_per_A_ = p.phase_resistance_ohm * bandwidth_rad_per_s / rating.pwm_Hz;
-    relief_d_ = ki_V_per_A_ / kp_d_V_per_A_;
-    relief_q_ = ki_V_per_A_ / kp_q_V_per_A_;
+    relief_d_ = relief(ki_V_per_A_ / kp_d_V_per_A_);
+    relief_q_ = relief(ki_V_per_A_ / kp_q_V_per_A_);
   }
 
   void reset() { integral_V_ = {0.0f, 0.0f}; }
@@ -43,6 +43,9 @@ class CurrentLoop {
   }
 
  private:
+  /// A winding that is done within a period would be relieved of more than what is missing, and swing about the limit.
+  static constexpr float relief(float ratio) { return ratio < 1.0f ? ratio : 1.0f; }
+
   float inductance_d_H_ = 0.0f, inductance_q_H_ = 0.0f, flux_linkage_Wb_ = 0.0f;
   float kp_d_V_per_A_ = 0.0f, kp_q_V_per_A_ = 0.0f;
   float ki_V_per_A_ = 0.0f;                  // per PWM period

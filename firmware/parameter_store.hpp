@@ -65,6 +65,8 @@ class ParameterStore {
   wire::Status get(const wire::Address& of, float& value) const;
   /// Into the staged set: the range counts, the rest is seen by commit. NaN takes a value back that has no default.
   wire::Answer stage(const wire::Assignment& one);
+  /// Nothing is staged any more.
+  void take_back() { staged_ = in_force_; }
   /// staged := in force, saved or defaults.
   wire::Answer load(wire::LoadFrom from);
   /// The staged set is checked as a whole and put in force. Refused: nothing has changed.

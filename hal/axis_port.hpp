@@ -23,7 +23,8 @@ struct AxisSample {
   wire::Abc current_A;  // phase currents, positive into the motor, after the nominal offset
   float bus_V;
   float rotor_rad;         // mechanical angle, [0, 2 pi], rising when the phases follow each other as a, b, c
-  std::uint32_t sequence;  // number of the PWM period: rises by one each, also over periods without a sample; may wrap
+  std::uint32_t sequence;  // number of the PWM period: rises by one each, also over periods without a sample; may wrap.
+                           // By one more where the encoder was set anew: a jump of the angle that is no movement
   bool valid;              // false: a conversion, a sensor or the encoder was not trustworthy
 };
 

@@ -36,7 +36,7 @@ inline constexpr std::uint8_t reply_bit = 0x80;
 
 // clang-format off
 enum class Kind : std::uint8_t {        // request                            answer
-  hello              = 0x01,            // -                                  Hello
+  hello              = 0x01,            // -                                  Hello                takes back what is staged
   describe_parameter = 0x02,            // Index                              ParameterText + name, unit, doc
   describe_signal    = 0x03,            // Index                              SignalText + name, unit, doc
   get                = 0x04,            // Address[]                          Answer + float[]     values in force

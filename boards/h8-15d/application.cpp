@@ -60,7 +60,6 @@ void Application::prepare(std::uint32_t reset_flags, bool clock_good) {
   if (clock_good_) usb_port_.set_up();
   if (!good_) return;
   stage_.set_up();
-  for (int i = 0; i < 2; ++i) find_rotor(i);
   good_ = stage_.start();
 }
 
@@ -82,24 +81,39 @@ void Application::remember() {
   keeper_.keep(driver_.memory());
 }
 
-/// Where the rotor stands before the first index pulse: on the pulse itself, or somewhere in a Hall sector.
+/// Where the rotor stands before the first index pulse: somewhere in a Hall sector, or on the pulse itself.
 void Application::find_rotor(int axis) {
-  if (read_pin(pins[axis].index)) {
-    stage_.set_encoder_zero(axis, 0);
-    index_seen_[axis] = true;
-    stage_.trust_encoder(axis);
-    return;
-  }
+  const std::uint32_t counter = reg((axis == 0 ? tim::tim3 : tim::tim4) + tim::cnt);
+  const firmware::AxisParameters& p = parameters_.in_force().axes[axis].drive;
+  stage_.distrust_encoder(axis);
   std::uint32_t hall = 0;
   for (int k = 0; k < 3; ++k) hall |= static_cast<std::uint32_t>(read_pin(pins[axis].hall[k])) << k;
   // Switch k is high for half an electrical turn from 120 k degrees: six sectors; here the middle of each, in turns.
   constexpr float middle_turns[8] = {-1.0f, 1.5f / 6, 3.5f / 6, 2.5f / 6, 5.5f / 6, 0.5f / 6, 4.5f / 6, -1.0f};
-  const float pole_pairs = parameters_.in_force().axes[axis].drive.pole_pairs_count;
-  if (middle_turns[hall] < 0.0f || !(pole_pairs >= 1.0f))
-    return;  // no such sector: not trusted, the axis refuses to arm
-  const auto counts = static_cast<std::uint32_t>(middle_turns[hall] / pole_pairs * static_cast<float>(encoder_counts));
-  stage_.set_encoder_zero(axis, 0u - counts);
-  stage_.trust_encoder(axis);
+  // The switches tell where the magnet is; what the encoder has to read there is its offset more.
+  const float turns = (middle_turns[hall] + p.angle_offset_rad * (0.5f / 3.1415927f)) / p.pole_pairs_count;
+  on_hall_[axis] = middle_turns[hall] >= 0.0f && turns > -1.0f && turns < 2.0f;
+  if (on_hall_[axis]) {
+    const auto counts = static_cast<std::int32_t>(turns * static_cast<float>(encoder_counts));
+    stage_.set_encoder_zero(axis, counter - static_cast<std::uint32_t>(counts));
+    stage_.trust_encoder(axis);
+  }  // else no such sector, or no such parameters: without an index the axis refuses to arm
+  if (read_pin(pins[axis].index)) index(axis);
+}
+
+/// A commit may bring other pole pairs or another offset, and with them another place of a rotor whose index was not
+/// seen yet. Nobody drives: what is armed behind the commit still waits for a setpoint.
+void Application::follow_commit() {
+  for (int i = 0; good_ && i < 2; ++i) {
+    const firmware::AxisParameters& p = parameters_.in_force().axes[i].drive;
+    const std::uint32_t now[2] = {firmware::bits(p.pole_pairs_count), firmware::bits(p.angle_offset_rad)};
+    if (std::memcmp(now, found_with_[i], sizeof now) == 0) continue;
+    std::memcpy(found_with_[i], now, sizeof now);
+    const Priority& index_irq = i == 0 ? index0_irq : index1_irq;
+    hold_off(index_irq);
+    if (!index_seen_[i]) find_rotor(i);
+    let_in(index_irq);
+  }
 }
 
 // ---- interrupts -----------------------------------------------------------------------------------------------------
@@ -119,12 +133,25 @@ void Application::control() {
   }
 }
 
+/// The first index moves the field by half a sector at most, and as much again for how the switches are mounted. What
+/// asks for more is a glitch on the line, or an offset that is another motor's, and would turn the field anywhere.
+bool Application::agrees_with_hall(int axis, std::uint32_t slipped) const {
+  constexpr std::uint32_t sector = encoder_counts / 6;
+  const auto pole_pairs = static_cast<std::uint32_t>(parameters_.in_force().axes[axis].drive.pole_pairs_count);
+  const std::uint32_t electrical = slipped * pole_pairs & (encoder_counts - 1);
+  return electrical <= sector || electrical >= encoder_counts - sector;
+}
+
 void Application::index(int axis) {
   const std::uint32_t counter = reg((axis == 0 ? tim::tim3 : tim::tim4) + tim::cnt);
   const std::uint32_t slipped = (counter - stage_.encoder_zero(axis)) & (encoder_counts - 1);
   constexpr std::uint32_t tolerance = 4;  // latency of this interrupt at 1000 rad/s, and which flank of the pulse
   if (index_seen_[axis] && slipped > tolerance && slipped < encoder_counts - tolerance) {
     stage_.distrust_encoder(axis);  // counts were lost or invented since the last turn
+    return;
+  }
+  if (!index_seen_[axis] && on_hall_[axis] && !agrees_with_hall(axis, slipped)) {
+    stage_.distrust_encoder(axis);
     return;
   }
   if (!index_seen_[axis]) stage_.set_encoder_zero(axis, counter);
@@ -162,6 +189,7 @@ void Application::every_ms(std::uint32_t ms) {
   read_slow_channel();
   look_at_door();
   link_.work(parameter_flash_);
+  follow_commit();
   if (!usb_connected_ && clock_good_ && ms >= usb_connect_ms) {
     usb_connected_ = true;
     usb_port_.connect(true);

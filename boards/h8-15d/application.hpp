@@ -43,6 +43,8 @@ class Application {
 
  private:
   void find_rotor(int axis);
+  void follow_commit();
+  bool agrees_with_hall(int axis, std::uint32_t slipped) const;
   void every_ms(std::uint32_t ms);
   void slow_lane();
   void read_slow_channel();
@@ -68,7 +70,8 @@ class Application {
   std::atomic<std::uint32_t> milliseconds_{0};
   std::atomic<std::uint32_t> fast_ticks_[2]{};
   std::uint32_t fast_fed_ = 0, fed_[2]{}, slow_ticks_ = 0, slow_ms_ = 0;
-  bool index_seen_[2]{};
+  bool index_seen_[2]{}, on_hall_[2]{};
+  std::uint32_t found_with_[2][2]{};  // pole pairs and offset, as bits, that the encoder's zero was found with
   bool good_ = false, clock_good_ = false;
   int slow_channel_ = 0, force_axis_ = 0, slow_wait_ms_ = 0;
   hal::Temperature housing_[2]{}, power_stage_{};

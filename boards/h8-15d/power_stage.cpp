@@ -140,7 +140,10 @@ hal::AxisSample PowerStage::sample(int axis) {
   }
   active_[axis] = loading_[axis];
 
-  const auto angle_counts = (reg(encoder[axis] + tim::cnt) - encoder_zero_[axis]) & (encoder_counts - 1);
+  const std::uint32_t zero = encoder_zero_[axis];  // once: the index interrupt may come in between
+  const auto angle_counts = (reg(encoder[axis] + tim::cnt) - zero) & (encoder_counts - 1);
+  if (zero != zero_seen_[axis]) ++sequence_[axis];  // set anew is not moved: behind a gap the core begins anew as well
+  zero_seen_[axis] = zero;
   if (wanted_on_[axis] && !driven(axis)) broken_[axis] = true;  // the break input, or the clock guard
   const int difference = static_cast<int>(bus_counts_) - static_cast<int>(bus_again_);
   const bool agrees = difference < 64 && difference > -64;  // 1 V between two converters on one pin

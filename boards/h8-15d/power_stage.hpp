@@ -61,6 +61,7 @@ class PowerStage {
   bool complete_ = false;
   volatile bool encoder_good_[2] = {};
   volatile std::uint32_t encoder_zero_[2] = {};
+  std::uint32_t zero_seen_[2] = {};
   std::uint32_t sequence_[2] = {}, cycles_[2] = {}, lost_[2] = {};
   int armed_ = 0;
   hal::Duty loading_[2] = {}, active_[2] = {};  // written this period; shaping the zero vector that is sampled next

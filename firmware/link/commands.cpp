@@ -114,6 +114,7 @@ void Commands::answer(const wire::Frame& request, bool parameters_free, Reply& r
   const auto kind = static_cast<Kind>(request.kind);
   switch (kind) {
     case Kind::hello:
+      if (parameters_free) parameters_.take_back();
       return hello(reply);
     case Kind::describe_parameter:
       return describe_parameter(head_of<wire::Index>(request).index, reply);
@@ -145,7 +146,7 @@ void Commands::answer(const wire::Frame& request, bool parameters_free, Reply& r
   }
 }
 
-/// A program that begins: what an earlier one had subscribed ends.
+/// A program that begins: what an earlier one had subscribed ends, and what it had staged is nobody's.
 void Commands::hello(Reply& reply) {
   recorder_.stream({});
   wire::Hello hello{};

@@ -11,6 +11,7 @@ void Link::restart() {
   reader_.restart();
   held_ = held_count_ = sent_ = queued_ = 0;
   if (errand_for_ == For::program) errand_for_ = For::nobody;
+  if (parameters_free()) commands_.parameters().take_back();
 }
 
 void Link::take(const std::uint8_t* data, std::size_t bytes) {

@@ -179,6 +179,122 @@ TEST(Image, StartsOnTheHallSensorsWhereTheRotorIsNotOnItsIndex) {
   }
 }
 
+/// Both rotors locked at this part of an electrical turn, away from the index; powered on with these parameters.
+std::unique_ptr<Pcb> standing_between_two_switches(double electrical_turns, const firmware::AxisSet (&setup)[2]) {
+  auto pcb = std::make_unique<Pcb>(design_of({}), 1);
+  pcb->flash_image(image);
+  pcb->flash_parameters(setup);
+  for (int i = 0; i < 2; ++i) {
+    pcb->bench.load(i).mode = host_sim::Load::Mode::locked;
+    pcb->bench.motor(i).place(electrical_turns * 2 * host_sim::pi / pcb->bench.motor(i).design().pole_pairs, 0);
+  }
+  pcb->power_on();
+  return pcb;
+}
+
+/// Most of the current is torque, in the direction asked for: a Hall sector is 60 degrees wide.
+void expect_torque(Pcb& pcb) {
+  ASSERT_TRUE(pcb.arm());
+  hold(pcb, 4.0f, 4.0f, 0.05);
+  for (int i = 0; i < 2; ++i) EXPECT_GT(pcb.bench.truth(i).current_q_A, 4.0 * 0.866 - 0.4);
+  NO_TROUBLE(pcb);
+}
+
+// Hall switches are mounted to the magnet, the index anywhere: its offset must not turn the field of a start on them.
+TEST(Image, AStartOnTheHallSensorsDoesNotDependOnWhereTheIndexIs) {
+  NEEDS_IMAGE(image);
+  for (const float offset_rad : {-3.1f, 1.0f, 3.1f}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    for (auto& s : setup) s.drive.angle_offset_rad = offset_rad;
+    for (const double electrical_turns : {0.05, 0.70}) {
+      SCOPED_TRACE(testing::Message() << offset_rad << " rad, at " << electrical_turns);
+      expect_torque(*standing_between_two_switches(electrical_turns, setup));
+    }
+  }
+}
+
+TEST(Image, ACommitOfPolePairsOrOffsetFindsARotorOnItsHallSensorsAnew) {
+  NEEDS_IMAGE(image);
+  for (const float first_pole_pairs : {1.0f, 5.0f}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    for (auto& s : setup) s.drive.pole_pairs_count = first_pole_pairs;
+    auto pcb = standing_between_two_switches(0.47, setup);
+    pcb->run_for(0.3);
+    for (const auto axis : {std::uint8_t{0}, std::uint8_t{1}}) {
+      ASSERT_EQ(pcb->order(h8_15d::order_stage, {{0x0105, axis}, 2.0f}).status, 0);
+      ASSERT_EQ(pcb->order(h8_15d::order_stage, {{0x0106, axis}, 2.5f}).status, 0);
+    }
+    ASSERT_EQ(pcb->order(h8_15d::order_commit).status, 0);
+    SCOPED_TRACE(first_pole_pairs);
+    expect_torque(*pcb);
+  }
+}
+
+// The Hall switches tell one pole pair from the other as little as they tell where in a sector: the first index moves
+// the rotor's angle by up to half a turn. That is no movement, and the current must not feel it as one.
+TEST(Image, TheFirstIndexAfterAStartOnTheHallSensorsIsNoMovement) {
+  NEEDS_IMAGE(image);
+  for (const double turns : {0.97, 0.47}) {
+    firmware::AxisSet setup[2];
+    setup_of({}, setup);
+    auto pcb = standing_between_two_switches(2 * turns, setup);
+    ASSERT_TRUE(pcb->arm());
+    hold(*pcb, 4.0f, 4.0f, 0.02);
+    for (int i = 0; i < 2; ++i) {
+      pcb->bench.load(i).mode = host_sim::Load::Mode::imposed_speed;
+      pcb->bench.load(i).speed_rad_per_s = 100;
+    }
+    double most_A = 0;
+    for (int k = 0; k < 4000; ++k) {  // 100 ms: past the index
+      for (int i = 0; i < 2 && k % 400 == 0; ++i) pcb->set_current(i, 0.0f, 4.0f);
+      pcb->run_for(25e-6);
+      for (int i : {0, 1}) {
+        const auto truth = pcb->bench.truth(i);
+        most_A = std::max(most_A, std::hypot(truth.current_d_A, truth.current_q_A));
+      }
+    }
+    std::printf("from %.2f turns: most current %.1f A\n", turns, most_A);
+    EXPECT_LT(most_A, 8.0) << turns;  // the field moves by up to half a sector
+    for (int i : {0, 1}) EXPECT_EQ(pcb->door().axis[i].mode, firmware::Mode::running);
+    NO_TROUBLE(*pcb);
+  }
+}
+
+// A glitch before the first index, or an offset that is another motor's: either would turn the field anywhere.
+TEST(Image, AnIndexThatTheHallSensorsContradictIsNotBelieved) {
+  NEEDS_IMAGE(image);
+  firmware::AxisSet setup[2];
+  setup_of({}, setup);
+  auto pcb = standing_between_two_switches(0.55, setup);
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  for (int i : {0, 1}) {
+    const h8_15d::Pin index = h8_15d::pins[i].index;
+    auto& counter = i == 0 ? pcb->chip.tim3 : pcb->chip.tim4;
+    counter.set_index_edges(pcb->bench.raw(i).encoder_counts);  // a glitch here and now, and not where the index is
+    pcb->chip.set_pin({index.port, index.number}, true);
+    pcb->chip.set_pin({index.port, index.number}, false);
+  }
+  double worst_A = 4.0;
+  for (int k = 0; k < 20; ++k) {
+    pcb->run_for(1e-3);
+    for (int i : {0, 1}) worst_A = std::min(worst_A, pcb->bench.truth(i).current_q_A);
+  }
+  EXPECT_GT(worst_A, -0.5) << "torque the wrong way";
+  for (int i : {0, 1}) EXPECT_EQ(pcb->door().axis[i].fault.fault, wire::Fault::invalid_sample);
+  NO_TROUBLE(*pcb);
+}
+
+TEST(Image, ARotorOnAnIndexThatTheHallSensorsContradictIsNotArmed) {
+  NEEDS_IMAGE(image);
+  firmware::AxisSet setup[2];
+  setup_of({}, setup);
+  for (auto& s : setup) s.drive.angle_offset_rad = 2.5f;  // the bench's index is where the magnet lies on phase a
+  EXPECT_FALSE(standing_between_two_switches(0.0, setup)->arm(0.3));
+}
+
 TEST(Image, RefusesToArmWithoutParameters) {
   NEEDS_IMAGE(image);
   Options o;

@@ -119,6 +119,21 @@ TEST_F(Linked, ParametersAreStagedCheckedAsAWholeSavedAndSurvive) {
   EXPECT_EQ(value(limit), 7.0f);
 }
 
+// One that crashed, or gave up when a later value was refused.
+TEST_F(Linked, WhatAnEarlierProgramHasStagedIsNotPutInForceByTheNext) {
+  ASSERT_EQ(program.status(Kind::stage, bytes_of(wire::Assignment{{0x0111, 1}, 12.0f})), 0);
+  ASSERT_TRUE(program.call(Kind::hello));
+  EXPECT_EQ(program.status(Kind::stage, bytes_of(wire::Assignment{{0x0115, 1}, 0.3f})), 0);
+  EXPECT_EQ(program.status(Kind::commit), 0);
+  EXPECT_EQ(board.parameters().in_force().axes[1].drive.ramp_s, 0.3f);
+  EXPECT_EQ(board.parameters().in_force().axes[1].drive.current_limit_A, 20.0f);
+
+  ASSERT_EQ(program.status(Kind::stage, bytes_of(wire::Assignment{{0x0111, 1}, 12.0f})), 0);
+  program = Program(board);
+  program.connect();  // a bus reset
+  EXPECT_FALSE(board.parameters().uncommitted()) << "or the terminal would be told to wait for ever";
+}
+
 TEST_F(Linked, NothingIsCommittedOrSavedWhileArmed) {
   arm(2);
   EXPECT_EQ(program.status(Kind::commit), number(Status::not_disarmed));
