@@ -403,6 +403,33 @@ TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
   says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
 }
 
+TEST(SlowReport, LoadsThatBeginBetweenRowsAreNoCause) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    tests::BenchOptions options;
+    options.seconds = 1200;
+    options.seed = seed;
+    options.white_K = 0.05;
+    options.core_every_s = 0.1;
+    double until_s = 0, hold_A = 0;
+    options.current_A = [&](double t, std::mt19937_64& random) {  // for 2 to 20 s each
+      std::uniform_real_distribution<double> uniform;
+      if (t >= until_s) {
+        until_s = t + 2 + 18 * uniform(random);
+        hold_A = uniform(random) < 0.5 ? 0 : 5 * uniform(random);
+      }
+      return hold_A;
+    };
+    auto logs = tests::bench_logs({options});
+    for (auto& column : logs[0].columns) {  // a row a second
+      for (std::size_t i = 0; 10 * i < column.size(); ++i) column[i] = column[10 * i];
+      column.resize(column.size() / 10);
+    }
+    const identify::Report report = identify::discover(logs, tests::ec_16());
+    EXPECT_EQ(report.verdict, Verdict::insufficient) << seed;
+    says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
+  }
+}
+
 TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
   tests::BenchOptions options;
   options.seconds = 1200;
