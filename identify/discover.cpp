@@ -499,7 +499,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
-    report.extended_rmse = rmse_of(problem, answer);
+    report.extended_rmse = rmse_of(problem, extended ? closest(problem, answer) : answer);
     tell(problem, found, report);
     if (found.verdict != Verdict::adequate) {
       note_still_ambient(logs, report);

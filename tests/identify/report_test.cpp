@@ -430,6 +430,24 @@ TEST(SlowReport, LoadsThatBeginBetweenRowsAreNoCause) {
   }
 }
 
+TEST(SlowReport, WhatIsMissedBesideCausesIsOfTheirNearestFitToo) {
+  tests::BenchOptions options;
+  options.seconds = 1200;
+  options.white_K = 0.05;
+  options.slow_K = 0.02;
+  options.step_K = 0.02;
+  options.extra_housing_W = [&](double, double, double housing_degC) {  // cools by more where it is hotter
+    return -0.001 * (housing_degC - options.ambient_degC) * (housing_degC - options.ambient_degC);
+  };
+  auto logs = tests::bench_logs({options});
+  auto& housing = logs[0].of(identify::Role::housing);
+  std::rotate(housing.begin(), housing.end() - 15, housing.end());  // 1.5 s late, which the fit averages over
+  std::fill(housing.begin(), housing.begin() + 15, options.start_degC);
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
+  EXPECT_LT(report.extended_rmse.housing_K, 0.12);  // twice the noise
+}
+
 TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
   tests::BenchOptions options;
   options.seconds = 1200;
