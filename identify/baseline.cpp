@@ -136,7 +136,7 @@ Fit fit_baseline(const Problem& problem) {
   return f;
 }
 
-Fit closest(const Problem& problem, const Fit& baseline) {
+Fit closest(const Problem& problem, const Fit& motor) {
   int housing = 0, core = 0;  // readings
   for (const Bins& log : problem.logs) {
     for (const Bin& bin : log.bins) housing += bin.housing_n > 0, core += bin.core_n > 0;
@@ -146,9 +146,9 @@ Fit closest(const Problem& problem, const Fit& baseline) {
   constexpr double each_K = 1;  // a minute of readings outweighs what is believed of a motor
   plain.noise = {.housing_white_K = each_K, .housing_slow_K = 0, .core_white_K = each_K};
   if (core > 0 && housing > 0) plain.noise.core_white_K *= std::sqrt(static_cast<double>(core) / housing);
-  const Fit found = fit(plain, {}, {&baseline});
-  if (!found.valid() || !(rmse_of(problem, found).judged_K() < rmse_of(problem, baseline).judged_K())) return baseline;
-  Fit out = fit(problem, {}, {&found}, 0);  // there, as unsure as the noise leaves it
+  const Fit found = fit(plain, motor.chosen, {&motor});
+  if (!found.valid() || !(rmse_of(problem, found).judged_K() < rmse_of(problem, motor).judged_K())) return motor;
+  Fit out = fit(problem, motor.chosen, {&found}, 0);  // there, as unsure as the noise leaves it
   out.uneven_per_A2 = found.uneven_per_A2;
   out.settled = found.settled;
   out.iterations = found.iterations;

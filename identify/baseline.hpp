@@ -9,10 +9,10 @@ namespace identify {
 /// Two resistors fitted by themselves. Throws UserError (unusable) where no such motor can be.
 Fit fit_baseline(const Problem& problem);
 
-/// The same as near to the readings as least squares in kelvins comes, winding and housing counted alike: where something
-/// is missing, a fit that averages over slow noise and leeway misses by more than two resistors need to, and what was
-/// found is to be compared with the best that they can do.
-Fit closest(const Problem& problem, const Fit& baseline);
+/// The same model as near to the readings as least squares in kelvins comes, winding and housing counted alike: a fit that
+/// averages over slow noise and leeway misses by more than it needs to, and what was found is to be compared with the
+/// best that two resistors can do, each at its nearest.
+Fit closest(const Problem& problem, const Fit& motor);
 
 /// Fills the baseline part of the report (parameters, errors, structure, identifiability, variants, plots) from `fit`.
 /// `judged_ratio`: of what the search saw it leave to the noise, beside what no motor is without; 0: no search.

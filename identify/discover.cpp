@@ -351,9 +351,9 @@ Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::o
   return out;
 }
 
-/// The same fit, as unsure as a winding leaves it that is neither on a sheet nor read.
+/// The same fit, as unsure as a winding leaves it that is not read; what a sheet says of it is believed beside that.
 Fit as_unsure_as_unseen(const Problem& problem, Fit f) {
-  if (problem.any_core() || problem.belief.known || !f.valid()) return f;
+  if (problem.any_core() || !f.valid()) return f;
   Problem unsure = problem;
   unsure.leeway = ordinary_leeway(problem, f);
   for (Leeway& more : leeway_of_an_unseen_winding(problem, f)) unsure.leeway.push_back(std::move(more));
@@ -500,7 +500,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
-    report.extended_rmse = rmse_of(problem, answer);
+    report.extended_rmse = rmse_of(problem, extended ? closest(problem, answer) : answer);
     tell(problem, found, report);
     if (found.verdict != Verdict::adequate) {
       note_still_ambient(logs, report);

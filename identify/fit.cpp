@@ -332,7 +332,9 @@ Fit as_wide_as_its_ridge(const Problem& problem, Fit f) {
   const Averaged averaged(problem);
   const Fit here = descend(problem, averaged, f.chosen, c, f.x, 20);
   if (!here.valid()) return f;
-  const double noise2 = std::max(1.0, here.ratio() * here.ratio());
+  const auto noise2_of = [](const Fit& of) { return std::max(1.0, of.ratio() * of.ratio()); };
+  const double noise2 = noise2_of(here), given = f.covariance()(0, 0) * noise2_of(f);
+  const Fit as_given = f;
   f.information = here.information;
   f.from_data = here.from_data;
   double variance = f.covariance()(0, 0) * noise2;
@@ -348,6 +350,7 @@ Fit as_wide_as_its_ridge(const Problem& problem, Fit f) {
     const double dearer = std::max(there.cost - here.cost, least) / noise2;
     if (far * far / (2 * dearer) > variance) variance = far * far / (2 * dearer), along = (there.x - here.x) / step;
   }
+  if (variance < given) return as_given;  // there is another valley near it, and a narrower one
   if (along.size() == 0) return f;
   const double more = variance / noise2 - f.covariance()(0, 0);
   for (Eigen::MatrixXd* known : {&f.information, &f.from_data}) {  // Sherman and Morrison: the inverse of a sum

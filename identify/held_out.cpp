@@ -78,7 +78,8 @@ Interval middle_95(const std::vector<double>& sorted) {
 
 /// What was held out may speak against the answer: what was found does worse there, or all that was fitted misses far
 /// more than where it was fitted.
-std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore& out, const Report& report) {
+std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore& out, const Rmse& fitted,
+                           const Report& report) {
   const auto of = [&](const Rmse& e) { return out.winding ? e.core_K : e.housing_K; };
   const double before_K = of(out.before), after_K = of(out.after);
   const char* what = out.winding ? "winding" : "housing";
@@ -95,7 +96,7 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore&
   for (const Block& b : blocks) sum2 += b.after * b.after / b.readings, readings += b.readings;
   const double lasting_K = std::sqrt(sum2 / std::max(readings, 1.0));
   constexpr double far = 3, worth_K = 1;
-  const double fitted_K = of(report.causes.empty() ? report.baseline_rmse : report.extended_rmse);
+  const double fitted_K = of(fitted);
   const bool answered = report.verdict != Verdict::unknown_cause && report.verdict != Verdict::insufficient;
   if (answered && !std::isnan(fitted_K) && lasting_K > std::max(worth_K, far * fitted_K))
     return fmt::format(
@@ -105,12 +106,12 @@ std::string speaks_against(const std::vector<Block>& blocks, const HeldOutScore&
   return "";
 }
 
-void judge(const Problem& problem, const Fit& baseline, const Fit& extended, int draws, const Report& report,
-           HeldOutScore& out) {
+void judge(const Problem& problem, const Fit& baseline, const Fit& extended, int draws, const Rmse& fitted,
+           const Report& report, HeldOutScore& out) {
   out.winding = problem.any_core();
   const auto blocks = blocks_of(problem, baseline, extended, out.winding);
   out.blocks = static_cast<int>(blocks.size());
-  out.against = speaks_against(blocks, out, report);
+  out.against = speaks_against(blocks, out, fitted, report);
   if (blocks.size() < least_blocks || draws < least_draws) return;
   const Resampled r = resampled(blocks, draws);
   out.before_95 = middle_95(r.before_K);
@@ -151,7 +152,7 @@ HeldOutScore score_held_out(const Problem& unseen, const Problem& fitted, const 
     out.before = rmse_of(unseen, before, several ? &out.each_before : nullptr);
   }
   out.after = rmse_of(unseen, after);
-  judge(unseen, before, after, held.draws, report, out);
+  judge(unseen, before, after, held.draws, rmse_of(fitted, extended), report, out);
   add_plots(unseen, before, remark, report);
   add_extended(unseen, after, report, report.plots.size() - unseen.logs.size());
   return out;

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
+#include <random>
 
 #include "identify/baseline.hpp"
 #include "identify/disturbance.hpp"
@@ -273,6 +275,21 @@ std::vector<double> told_next(std::vector<double> load) {
 /// A row sooner than that.
 std::vector<double> told_sooner(std::vector<double> load) { return a_row_sooner(told_next(std::move(load))); }
 
+/// As it was told last, but for where it steps: there drawn, last or a row sooner, or the `other` of the two. A load
+/// that goes smoothly does not. Of columns that tell one current together, alike.
+std::vector<double> told_either(std::vector<double> load, unsigned draw, bool other) {
+  constexpr double steps = 2;  // times what it changes by in the rows before and after, and more
+  std::mt19937 random(draw);
+  std::vector<double> out = told_last(load);
+  const std::vector<double> last = out, sooner = told_sooner(std::move(load));
+  const auto change = [&](std::size_t i) { return i + 1 < last.size() ? std::abs(last[i + 1] - last[i]) : 0; };
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const bool drawn = (random() % 2 == 0) != other;
+    if (drawn && change(i) > steps * std::max(i > 0 ? change(i - 1) : 0, change(i + 1))) out[i] = sooner[i];
+  }
+  return out;
+}
+
 /// In each row the most, or the least, that it and its neighbours tell: what flowed, if rows keep step with a gait.
 std::vector<double> told_around(const std::vector<double>& load, bool most) {
   const std::vector<double> told = told_next(load);
@@ -288,7 +305,8 @@ std::vector<double> told_at_crests(std::vector<double> load) { return told_aroun
 std::vector<double> told_in_troughs(std::vector<double> load) { return told_around(load, false); }
 
 /// The same logs under a load that is `as` makes it of what was measured.
-Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double> (*as)(std::vector<double>)) {
+Problem under(const Problem& problem, std::vector<Log> logs,
+              const std::function<std::vector<double>(std::vector<double>)>& as) {
   for (Log& log : logs) {
     for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
       if (log.has(role)) log.of(role) = as(without_lines(log, role));
@@ -301,23 +319,35 @@ Problem under(const Problem& problem, std::vector<Log> logs, std::vector<double>
 double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs) {
   const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
                 sooner = under(problem, logs, told_sooner);
-  double moved2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
+  std::vector<Problem> drawn;  // pairs: one may end where it began by chance
+  for (unsigned i = 0; i < 8; ++i) {
+    drawn.push_back(under(problem, logs,
+                          [&](std::vector<double> load) { return told_either(std::move(load), i / 2, i % 2 == 1); }));
+  }
+  double moved2 = 0, drawn2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
     const auto run = [&](const Problem& p) { return replayed(p, baseline, l).*of; };
     const std::vector<double> line = run(problem), a = run(last), b = run(next), c = run(sooner);
+    std::vector<std::vector<double>> draws;
+    std::transform(drawn.begin(), drawn.end(), std::back_inserter(draws), run);
     for (std::size_t k = 0; k < line.size(); ++k) {
       // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
       const double less_K = (a[k] + b[k]) / 2 - line[k], rise_K = line[k] - line[0];
       moved2 += (a[k] - c[k]) * (a[k] - c[k]);
+      for (std::size_t i = 0; i < draws.size(); i += 2) {
+        const double off_K = (draws[i][k] - draws[i + 1][k]) / 2;
+        drawn2 += off_K * off_K / (static_cast<double>(draws.size()) / 2);
+      }
       less2 += less_K * less_K;
       less_rise += less_K * rise_K;
       rise2 += rise_K * rise_K;
       ++bins;
     }
   }
-  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12).
-  return std::sqrt((moved2 / 12 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
+  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12): all steps alike,
+  // or each for itself, where their heat no longer adds up. Drawn was one end or the other, half the interval off.
+  return std::sqrt((moved2 / 12 + drawn2 / 3 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
 }
 
 /// Does the load alternate faster than rows are written, so that each is a draw? From one row to the next but one a

@@ -345,6 +345,7 @@ TEST(SlowReport, ARoomThatSwungUnwatchedByTenthsOfAKelvinIsNoCause) {
 
 TEST(SlowReport, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
   double most = 0, most_of_curvature = 0;
+  const std::optional<wire::pc::MotorFile> sheets[] = {std::nullopt, tests::ec_16()};
   for (const double exponent : {0.05, 0.1}) {
     tests::BenchOptions options;
     options.seconds = 1200;
@@ -356,13 +357,16 @@ TEST(SlowReport, R1OfAnUnseenWindingIsAsUnsureAsItIsWrong) {
       return rise_K / options.motor.R2 * (1 - std::pow(rise_K / 30, exponent));
     };
     const auto logs = tests::bench_logs({options});
-    const double right = std::log(options.motor.R1 * options.motor.ohm);  // in units of one ohm
-    const identify::ParameterLine R1 = identify::discover(logs, std::nullopt).baseline[0];
-    most = std::max(most, std::abs(std::log(R1.value) - right) / (R1.std_error / R1.value));
-    const identify::Problem problem = identify::problem_of(logs, std::nullopt);
-    const identify::ParameterLine of_curvature = identify::base_lines(problem, identify::fit_baseline(problem), 1)[0];
-    most_of_curvature = std::max(most_of_curvature, std::abs(std::log(of_curvature.value) - right) /
-                                                        (of_curvature.std_error / of_curvature.value));
+    for (const auto& sheet : sheets) {
+      const double right = std::log(options.motor.R1 * (sheet ? 1 : options.motor.ohm));  // else in units of one ohm
+      const auto off = [&](const identify::ParameterLine& R1) {
+        return std::abs(std::log(R1.value) - right) / (R1.std_error / R1.value);
+      };
+      most = std::max(most, off(identify::discover(logs, sheet).baseline[0]));
+      const identify::Problem problem = identify::problem_of(logs, sheet);
+      most_of_curvature =
+          std::max(most_of_curvature, off(identify::base_lines(problem, identify::fit_baseline(problem), 1)[0]));
+    }
   }
   EXPECT_LT(most, 3);
   EXPECT_GT(most_of_curvature, 3) << "what this test is about";
@@ -402,6 +406,51 @@ TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
   const identify::Report report = identify::discover(logs, tests::ec_16());
   EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
+}
+
+TEST(SlowReport, LoadsThatBeginBetweenRowsAreNoCause) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    tests::BenchOptions options;
+    options.seconds = 1200;
+    options.seed = seed;
+    options.white_K = 0.05;
+    options.core_every_s = 0.1;
+    double until_s = 0, hold_A = 0;
+    options.current_A = [&](double t, std::mt19937_64& random) {  // for 2 to 20 s each
+      std::uniform_real_distribution<double> uniform;
+      if (t >= until_s) {
+        until_s = t + 2 + 18 * uniform(random);
+        hold_A = uniform(random) < 0.5 ? 0 : 5 * uniform(random);
+      }
+      return hold_A;
+    };
+    auto logs = tests::bench_logs({options});
+    for (auto& column : logs[0].columns) {  // a row a second
+      for (std::size_t i = 0; 10 * i < column.size(); ++i) column[i] = column[10 * i];
+      column.resize(column.size() / 10);
+    }
+    const identify::Report report = identify::discover(logs, tests::ec_16());
+    EXPECT_EQ(report.verdict, Verdict::insufficient) << seed;
+    says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
+  }
+}
+
+TEST(SlowReport, WhatIsMissedBesideCausesIsOfTheirNearestFitToo) {
+  tests::BenchOptions options;
+  options.seconds = 1200;
+  options.white_K = 0.05;
+  options.slow_K = 0.02;
+  options.step_K = 0.02;
+  options.extra_housing_W = [&](double, double, double housing_degC) {  // cools by more where it is hotter
+    return -0.001 * (housing_degC - options.ambient_degC) * (housing_degC - options.ambient_degC);
+  };
+  auto logs = tests::bench_logs({options});
+  auto& housing = logs[0].of(identify::Role::housing);
+  std::rotate(housing.begin(), housing.end() - 15, housing.end());  // 1.5 s late, which the fit averages over
+  std::fill(housing.begin(), housing.begin() + 15, options.start_degC);
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
+  EXPECT_LT(report.extended_rmse.housing_K, 0.12);  // twice the noise
 }
 
 TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
