@@ -7,9 +7,6 @@
 
 namespace identify {
 
-/// The parameters of the which-th chosen cause, in its units.
-std::vector<ParameterLine> cause_lines(const Problem& problem, const Fit& fit, std::size_t which);
-
 /// All that `identify` says of logs that are fitted together; `hold_out`: what is scored and not fitted. Throws
 /// wire::pc::UserError (unusable) where the logs cannot be read together, or one has too few rows.
 Report discover(const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,

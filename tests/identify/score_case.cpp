@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 
+#include "identify/answer.hpp"
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
 #include "identify/leeway.hpp"

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "host-sim/plant/hidden_causes.hpp"
+#include "identify/answer.hpp"
 #include "identify/baseline.hpp"
 #include "identify/discover.hpp"
 #include "identify/experiment.hpp"
