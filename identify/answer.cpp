@@ -133,8 +133,9 @@ std::string sentence(const Found& found, const Report& r) {
   const Rmse& e = r.baseline_rmse;
   // Readings of the winding may be too noisy to show what the housing's do.
   constexpr double visible = 1.1;  // by a tenth
-  const bool hides = (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) && !std::isnan(e.housing_K) &&
-                     e.core_K < visible * r.extended_rmse.core_K;
+  const double times_core = e.core_K / r.extended_rmse.core_K, times_housing = e.housing_K / r.extended_rmse.housing_K;
+  const bool hides = (names_causes(found.verdict) || found.verdict == Verdict::ambiguous) && times_core < visible &&
+                     times_housing > times_core;
   const bool core = !std::isnan(e.core_K) && !hides;
   const Noise& n = found.noise;
   const double noise_K =

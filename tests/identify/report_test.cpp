@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "identify/answer.hpp"
 #include "identify/baseline.hpp"
 #include "identify/discover.hpp"
 #include "identify/fit.hpp"
@@ -216,6 +217,26 @@ TEST(Report, TwoResistorsAreComparedAsNearAsTheyCome) {
       EXPECT_GT(missed_K(other), 0.99 * missed_K(near)) << i;
     }
   }
+}
+
+TEST(Report, TheSentenceIsOfTheChannelThatShowsMore) {
+  identify::Found found;
+  found.verdict = Verdict::explained;
+  found.tied = {{"sensor_lag"}};
+  found.noise.core_white_K = 1;
+  identify::Report report;
+  const auto told_of = [&](const identify::Rmse& two_resistors, const identify::Rmse& extended) {
+    report.baseline_rmse = two_resistors;
+    report.extended_rmse = extended;
+    identify::say({}, found, report);
+    return report.sentence;
+  };
+  says(told_of({.housing_K = 0.13, .core_K = 1.11}, {.housing_K = 0.26, .core_K = 1.01}), "misses the winding");
+  says(told_of({.housing_K = 0.26, .core_K = 1.11}, {.housing_K = 0.13, .core_K = 1.01}), "misses the housing");
+  says(told_of({.housing_K = 0.26, .core_K = 3.0}, {.housing_K = 0.13, .core_K = 1.01}), "misses the winding");
+  const double none = identify::missing;
+  says(told_of({.housing_K = none, .core_K = 1.11}, {.housing_K = none, .core_K = 1.01}), "misses the winding");
+  says(told_of({.housing_K = 0.26, .core_K = none}, {.housing_K = 0.13, .core_K = none}), "misses the housing");
 }
 
 TEST(Report, TheGainSaysWhatTheBoardWouldDoWithEachModel) {
