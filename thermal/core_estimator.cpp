@@ -21,7 +21,7 @@ constexpr int missing_steps = 10;       // 100 ms without a reading: safety tabl
 constexpr int slow_window_steps = 200;  // a sensor that needs longer to fill a window is no better than none: chosen
 constexpr int most_lost_steps = 200;    // 2 s: no watchdog waits longer
 constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
-constexpr float suspicious_pull_K = 1.0f;  // lowered by less, a stuck sensor does little harm: chosen
+constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
 constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
 constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
 constexpr float unheard_sigma_K = 3.0f;  // that housing and ambient are less known by, once nothing tells them; chosen
@@ -38,6 +38,10 @@ constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K unti
 // Drift of the ambient: 10 K in 20 min, at most 10 K off while it is observed; it also takes up cooling that differs
 // from the sheet's. Of any node: 0.1 K in a second's square root, what no parameter explains.
 constexpr float ambient_walk_K2_per_s = 100.0f / 1200.0f, ambient_worst_K = 10.0f, node_walk_K2_per_s = 1e-2f;
+
+// One sigma of what a housing sensor may lag beside what was told, where only the sheet is known; in proportion less
+// where the trust says that more is. Glued or potted ones lag 10..60 s, and the rms of anything up to 60 s is 35 s.
+constexpr double untold_lag_s = 35.0, told_lag_share = 0.5;  // the latter, of what was told: chosen
 
 float squared(float x) { return x * x; }
 
@@ -76,6 +80,9 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
   due_K_ = Row::Zero(n_ + 5);
+  const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
+  const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
+  late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
   widen_all();
   soak();
   publish();
@@ -92,6 +99,7 @@ void CoreEstimator::soak() {
 /// Nothing is known about the temperatures but the state itself; the parameters stay what the trust says.
 void CoreEstimator::widen_all() {
   p_ = Covariance::Zero(n_ + 5, n_ + 5);
+  late_shared_K_ = Row::Zero(n_ + 5);
   for (int i = 0; i < n_; ++i) p_(i, i) = squared(start_sigma_K);
   p_(ambient(), ambient()) = squared(settings_.ambient_sigma_K);
   p_(sensor(), sensor()) = squared(start_sigma_K);
@@ -152,10 +160,13 @@ void CoreEstimator::step() {
   degC_ = network_.step(transition_, degC_, input_);
   const double target =
       degC_[housing_.node] * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
-  sensor_degC_ += (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
+  const double moved_K = (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
+  late_K_ += moved_K - late_take_ * (target - sensor_degC_ + late_K_);
+  sensor_degC_ += moved_K;
 }
 
 /// P = F P F' + Q with F = [phi0, phi1 d(rate)/d(ambient, parameters); 0, 1], and the sensor's lag as a row of its own.
+/// What the untold lag shares with the states moves with them.
 void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates) {
   const int size = n_ + 5;
   using Mat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, max_nodes, max_nodes>;
@@ -182,12 +193,14 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
 
   const Covariance fp = f.lazyProduct(p_);
   p_ = fp.lazyProduct(f.transpose());
+  late_shared_K_ = f.lazyProduct(late_shared_K_).eval();
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
   if (acquired_ && p_(ambient(), ambient()) < squared(ambient_worst_K))
     p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
   if (ambient_known_) {
     p_.row(ambient()).setZero();
     p_.col(ambient()).setZero();
+    late_shared_K_[ambient()] = 0.0f;
     p_(ambient(), ambient()) = 1.0f;  // a sensor beside the motor is good to 1 K
   }
 }
@@ -242,12 +255,13 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
   seen[sensor()] = 1.0f;
   const float noise = squared(settings_.housing_noise_K);
   if (!acquired_) {
-    acquired_ = correct(seen, innovation_K, noise, std::numeric_limits<float>::infinity(), 1);
+    acquired_ = correct(seen, innovation_K, noise, 0.0f, std::numeric_limits<float>::infinity(), 1);
     trusted_ambient_degC_ = ambient_degC_;
     if (acquired_) raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
     return;
   }
-  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + noise);
+  const float late_K = static_cast<float>(late_K_);
+  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
   const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
   // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
   const float expected_K = std::abs(model_moved_K_);
@@ -269,7 +283,7 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
   // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
   const float believed_K = std::fmax(gate_K, hotter_K_);
   hotter_K_ = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
-  correct(seen, std::fmin(innovation_K, believed_K), noise, left_K > 0.0f ? left_K : 0.0f, window_steps);
+  correct(seen, std::fmin(innovation_K, believed_K), noise, late_K, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
 /// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
@@ -308,12 +322,21 @@ void CoreEstimator::settle(int steps) {
   due_steps_ -= steps;
 }
 
-/// Schmidt-Kalman correction in Joseph form, shortened so that it lowers no winding by more than most_down_K. It flows
-/// in over some steps: a jump of the estimate would be a jump of the allowance, which drops the robot.
-bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps) {
+/// Schmidt-Kalman correction in Joseph form by a reading that may be late_K too low for each sigma of the untold lag
+/// (an error that stays, and that no reading teaches: hearing it twice a second makes nothing surer), shortened so that
+/// it lowers no winding by more than most_down_K. It flows in over some steps: a jump of the estimate would be a jump
+/// of the allowance, which drops the robot.
+bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K,
+                            int over_steps) {
   Row shared = Row::Zero(n_ + 5);
   shared = p_.lazyProduct(seen);
-  const float expected_K2 = seen.dot(shared) + variance_K2;
+  float expected_K2 = seen.dot(shared) + variance_K2;
+  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one.
+  const bool raises = late_K != 0.0f && innovation_K > 0.0f;
+  const float doubt = raises ? 1.0f - innovation_K / least_gate_K : 1.0f;
+  const float lag_K = doubt > 0.0f ? doubt * (seen.dot(late_shared_K_) - late_K) : 0.0f;
+  shared += late_shared_K_ * lag_K;
+  expected_K2 += squared(lag_K);
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
@@ -333,6 +356,8 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   const Covariance half = keep.lazyProduct(p_);
   p_ = half.lazyProduct(keep.transpose());
   p_ += (gain * variance_K2).lazyProduct(gain.transpose());
+  // Raised, a state is no colder than it was: what a lag may hide grows only when a reading lowers.
+  if (!raises) late_shared_K_ = (keep.lazyProduct(late_shared_K_) + gain * late_K).eval();
   p_ = ((p_ + p_.transpose()) * 0.5f).eval();
   return true;
 }
@@ -361,11 +386,12 @@ bool CoreEstimator::hear_winding(float seen_degC, float sigma_K) {
   if (windings == 0) return false;
   Row seen = Row::Zero(n_ + 5);
   for (int i = 0; i < n_; ++i) seen[i] = std::isfinite(max_degC_[i]) ? 1.0f / static_cast<float>(windings) : 0.0f;
-  const float gate_K = gate_sigmas * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(sigma_K));
+  const float gate_K =
+      gate_sigmas * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(seen.dot(late_shared_K_)) + squared(sigma_K));
   const float innovation_K = seen_degC - static_cast<float>(sum_degC / windings);
   if (!(innovation_K > -gate_K)) return false;
   // Hotter than believable still counts, but one reading is only one.
-  return correct(seen, innovation_K < gate_K ? innovation_K : gate_K, squared(sigma_K),
+  return correct(seen, innovation_K < gate_K ? innovation_K : gate_K, squared(sigma_K), 0.0f,
                  std::numeric_limits<float>::infinity(), 1);
 }
 
@@ -382,7 +408,7 @@ HeatMemory CoreEstimator::save() const {
   HeatMemory memory{n_, {}, {}, static_cast<float>(ambient_degC_), flags_ & housing_contradicts ? 1u : 0u};
   for (int i = 0; i < n_; ++i) {
     memory.degC[i] = static_cast<float>(degC_[i]);
-    memory.sigma_K[i] = std::sqrt(p_(i, i));
+    memory.sigma_K[i] = estimate_.sigma_K[i];
   }
   return memory;
 }
@@ -455,6 +481,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   due_steps_ = 0;
   due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
+  late_K_ = 0.0;
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
   for (int i = 0; i < n_; ++i) {
@@ -473,10 +500,11 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
 /// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What
 /// has a limit and was not too cold may have been as hot as it seemed: it is at its limit at least.
 void CoreEstimator::guard_state() {
-  bool good = plausible(ambient_degC_) && plausible(sensor_degC_);
+  bool good = plausible(ambient_degC_) && plausible(sensor_degC_) && std::abs(late_K_) < hottest_possible_degC;
   for (int i = 0; i < n_; ++i) good = good && plausible(degC_[i]);
   bool sure = true;
-  for (int i = 0; i < n_ + 5; ++i) sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f;
+  for (int i = 0; i < n_ + 5; ++i)
+    sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f && std::abs(late_shared_K_[i]) < 1e3f;
   if (!sure) widen_all();
   if (good) {
     good_degC_ = degC_;
@@ -493,6 +521,7 @@ void CoreEstimator::guard_state() {
   sensor_degC_ = degC_[housing_.node];
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   model_moved_K_ = 0.0f;
+  late_K_ = 0.0;
   due_steps_ = 0;
   due_K_ = Row::Zero(n_ + 5);
   good_degC_ = degC_;
@@ -502,7 +531,7 @@ void CoreEstimator::publish() {
   estimate_.node_count = n_;
   for (int i = 0; i < n_; ++i) {
     estimate_.degC[i] = degC_[i];
-    estimate_.sigma_K[i] = std::sqrt(p_(i, i));
+    estimate_.sigma_K[i] = std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
                                    : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i];

@@ -5,10 +5,10 @@
 //   out   every node's temperature, its standard deviation, and what went wrong
 //
 // State in double at 100 Hz: float at the PWM rate loses small increments and reads up to 55 K too cold. The covariance
-// is float: it is a margin, not a memory. A Schmidt-Kalman filter: errors of the sheet (power, R1, R2) make sigma grow
-// with load, are never "learned" from the housing; the ambient is a slow state, since most boards cannot measure it.
-// Everything fails towards hot. Knows neither clock nor sensor. No heap; every call costs the same but for lost time.
-// Not for an ISR.
+// is float: it is a margin, not a memory. A Schmidt-Kalman filter: errors of the sheet (power, R1, R2) and a lag of the
+// housing sensor that nobody told make sigma grow with load, are never "learned" from the housing; the ambient is a
+// slow state, since most boards cannot measure it. Everything fails towards hot. Knows neither clock nor sensor. No
+// heap; every call costs the same but for lost time. Not for an ISR.
 #pragma once
 
 #include "thermal/network.hpp"
@@ -133,7 +133,7 @@ class CoreEstimator {
   void correct_by_housing(float reading_degC, float innovation_K);
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
-  bool correct(const Row& seen, float innovation_K, float variance_K2, float most_down_K, int over_steps);
+  bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
   void settle(int steps);
   float down_by(const Row& gain, float innovation_K) const;
   void guard_state();
@@ -153,7 +153,12 @@ class CoreEstimator {
   Vector degC_, good_degC_;
   double ambient_degC_, good_ambient_degC_, sensor_degC_;
   Covariance p_;
-  Row due_K_;  // what the last correction has yet to add, in due_steps_ steps
+  // The lag that nobody told: one more error that is never learned. What it shares with the states is kept apart from
+  // p_: sigma^2 is p_(i, i) + late_shared_K_[i]^2.
+  Row late_shared_K_;       // how much colder the states were made, per sigma of it
+  double late_K_ = 0.0;     // how much less a sensor reads that lags by one sigma more
+  double late_take_ = 1.0;  // share of its way that such a sensor goes in a step
+  Row due_K_;               // what the last correction has yet to add, in due_steps_ steps
   int due_steps_ = 0;
   HeatInput<> input_;
 

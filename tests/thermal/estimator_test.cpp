@@ -315,6 +315,44 @@ TEST(Estimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
   }
 }
 
+TEST(Estimator, ASensorThatLagsUntoldLetsNoWindingPassItsLimit) {
+  struct Case {
+    wire::Motor sheet;
+    float most_A;
+  };
+  struct Lag {
+    double s, overshoot_K;
+  };
+  constexpr double scales[][4] = {{1, 1, 1, 1}, {1.2, 1.12, 1.06, 1.12}, {0.85, 1.13, 0.95, 1.19}};  // R1 R2 C1 C2
+  for (const Case& c : {Case{reference::ec16(), 20}, Case{reference::powermax(), 80},
+                        Case{reference::motor(2.0, 1.41, 17.7, 0.90, 427), 15}}) {
+    for (const auto& scale : scales) {
+      for (const Lag lag : {Lag{10, 3}, Lag{20, 3}, Lag{30, 3}, Lag{60, 10}}) {  // safety.md: no fault, a single one
+        wire::Motor real = c.sheet;
+        real.R1_K_per_W *= scale[0];
+        real.R2_K_per_W *= scale[1];
+        real.C1_J_per_K *= scale[2];
+        real.C2_J_per_K *= scale[3];
+        Bench b(real, with(thermal::sheet_trust), 25, c.sheet);
+        thermal::GovernorSettings settings;
+        settings.max_A = c.most_A;
+        thermal::Governor governor(settings);
+        double allowed_A = 0, sensed_degC = 25, hottest_degC = 0;
+        for (int i = 0; i < 20000; ++i) {
+          b.run(0.01, allowed_A * allowed_A, [&] {
+            sensed_degC += (static_cast<double>(b.honest().value) - sensed_degC) * (1 - std::exp(-0.01 / lag.s));
+            return Reading{static_cast<float>(sensed_degC), true};
+          });
+          allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+          hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+        }
+        EXPECT_LE(hottest_degC, 155 + lag.overshoot_K) << lag.s << " s, R1 " << real.R1_K_per_W;
+        EXPECT_GT(hottest_degC, 125) << "the limit was never near, so nothing was shown";
+      }
+    }
+  }
+}
+
 TEST(Estimator, AHotReadingAlwaysRaises) {
   Bench bench(reference::ec16(), with(thermal::identified_trust), 25);
   bench.run(60, 2);
