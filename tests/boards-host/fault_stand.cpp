@@ -14,8 +14,8 @@ namespace {
 using boards::host::demand_A;
 
 constexpr long setpoint_periods = 20;  // the robot's computer speaks every millisecond
-constexpr long slow_periods = 200;     // 10 ms
-constexpr double after_trip_s = 0.1;   // an open bridge only cools
+constexpr long watch_periods = 20, slow_periods = 200;
+constexpr double after_trip_s = 0.1;  // an open bridge only cools
 constexpr double stage_max_degC = 100;
 constexpr double no_current_A = 0.01;
 
@@ -125,7 +125,10 @@ void Stand::period() {
   }
   bench.advance_period(duty);
   ++periods_;
-  if (slow_lane_alive && periods_ % slow_periods == 0) {
+  next_ = doors_[0].sample();
+  if (!slow_lane_alive) return;
+  if (periods_ % watch_periods == 0) driver->watch();
+  if (periods_ % slow_periods == 0) {
     using boards::host::slow_sample;
     driver->slow_tick(slow_sample(bench.board_raw(), design_.sensors),
                       {slow_sample(bench.raw(0), design_.sensors), slow_sample(bench.raw(1), design_.sensors)});

@@ -51,7 +51,7 @@ class Stand {
   // What it looks like.
   const firmware::Axis& axis() const { return driver->axis(0); }
   const Design& design() const { return design_; }
-  const hal::AxisSample& sample() const { return samples_[0]; }
+  const hal::AxisSample& sample() const { return next_; }  // that the next tick gets; the truth is of the same instant
   host_sim::AxisTruth truth() const { return bench.truth(0); }
   double time_s() const;
   double since_fault_s() const { return time_s() - design_.fault_s; }
@@ -82,6 +82,7 @@ class Stand {
   Design design_;
   boards::host::AxisDoor doors_[2];
   std::array<hal::AxisSample, 2> samples_{};
+  hal::AxisSample next_{};
   long periods_ = 0;
   bool armed_[2] = {false, false};
   wire::Status said_ = wire::Status::done;
