@@ -326,15 +326,8 @@ void Axis::watch() {
   if (mode_ != Mode::ready && mode_ != Mode::running) return watch_.forget();
   const std::uint32_t before = heat_.adding().periods;
   std::atomic_signal_fence(std::memory_order_seq_cst);
-  const Watch::Look look = {trace_.phase_A,
-                            trace_.current_A,
-                            trace_.asked_V,
-                            trace_.permitted_A,
-                            rotor_.half_a_period_before(trace_.rotor_rad),
-                            rotor_.electrical_rad_per_s(),
-                            trace_.bus_V,
-                            trace_.share,
-                            mode_ == Mode::running};
+  const Watch::Look look = {trace_.phase_A, trace_.current_A, trace_.asked_V,        rotor_.electrical_rad_per_s(),
+                            trace_.bus_V,   trace_.share,     mode_ == Mode::running};
   std::atomic_signal_fence(std::memory_order_seq_cst);
   if (heat_.adding().periods != before || commands_.load() != 0) return;
   const FaultRecord found = watch_.judge(look, {warm_ohm(), inductance_H_, flux_Wb_});

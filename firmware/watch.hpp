@@ -2,14 +2,14 @@
 // Looks at what the fast lane left behind, every millisecond from the slow lane's context: do its readings contradict
 // each other, or the motor? The fast lane has no instructions left for this, and a look takes none of it.
 //
-//   sum      three currents of a star have none. Where they have one a sensor is dead or stuck, or current leaks
-//   silence  one phase reads nothing of what is permitted for it, another one reads much: a lead or a switch is open
-//   answer   v = R i + j w (L i + flux). What is left over, the motor of the parameters cannot have made: a phase is
-//            open, the encoder does not say where the rotor is, or the samples are another motor's
+//   sum     three currents of a star have none. Where they have one a sensor is dead or stuck, or current leaks
+//   answer  v = R i + j w (L i + flux). What is left over, the motor of the parameters cannot have made: a phase is
+//           open, the encoder does not say where the rotor is, or the samples are another motor's
 //
 // No look decides alone: a doubt grows with each that contradicts and shrinks with each that does not. So noise, a step
 // of the current (over in a millisecond) or a spoilt sample trips nothing, and a contradiction that comes and goes with
-// the turning rotor does. Blind to the first two where the board makes a third current from the others.
+// the turning rotor does. At 1000 electrical turns a second all looks see one angle: no bound may hang on it. Blind to
+// the sum where the board makes a third current from the others.
 #pragma once
 
 #include <cmath>
@@ -24,8 +24,7 @@ class Watch {
   /// Of one tick.
   struct Look {
     Abc phase_A;
-    Dq current_A, asked_V, permitted_A;
-    ElectricalAngle rotor;
+    Dq current_A, asked_V;
     float electrical_rad_per_s, bus_V;
     float share;    // of the voltage asked for that the bus could give
     bool switches;  // the bridge does: the voltage is the motor's
@@ -46,15 +45,9 @@ class Watch {
     if (sum_doubt_ >= sum_beyond) return {wire::Fault::current_sum, 0, sum_A, sum_bound_A, 0.0f};
 
     if (!look.switches) return {};
-    const float silent_A = most_A > loud_A && look.share >= 1.0f ? permitted_in_silence_A(read_A, look) : 0.0f;
-    const float asked_A = std::fabs(look.permitted_A.d) + std::fabs(look.permitted_A.q);
-    const float silent_bound_A = silent_free_A + silent_share * asked_A;
-    silent_doubt_ = grown(silent_doubt_, silent_A <= silent_bound_A ? 0 : 2);
-    if (silent_doubt_ >= beyond) return {wire::Fault::phase_silent, 0, silent_A, silent_bound_A, 0.0f};
-
     const float left_V = unexplained_V(look, motor), bound_V = answer_bound_V(look, motor);
     answer_doubt_ = grown(answer_doubt_, left_V <= bound_V ? 0 : left_V <= 2.0f * bound_V ? 1 : 2);
-    if (answer_doubt_ >= beyond) return {wire::Fault::motor_differs, 0, left_V, bound_V, 0.0f};
+    if (answer_doubt_ >= answer_beyond) return {wire::Fault::motor_differs, 0, left_V, bound_V, 0.0f};
     return {};
   }
 
@@ -63,26 +56,14 @@ class Watch {
   // more than one in three for some time.
   static constexpr float sum_free_A = 1.5f, sum_share = 0.06f;
   static constexpr int sum_beyond = 6;
-  // What drifts by 0.3 A still reads as nothing. A current that lags behind its reference or is bent by phases that
-  // differ turns by less than asin(0.3) of it.
-  static constexpr float quiet_A = 0.3f, loud_A = 1.2f, silent_free_A = 1.0f, silent_share = 0.3f;
   // Free: 1.5 V of 48 V is three times what dead time is. A winding may have half the resistance of its hottest phase
   // (copper at 25 and at 200 degC), a magnet a quarter less flux than its sheet says (hot, and a sheet's tolerance),
   // iron half of its inductance.
   static constexpr float free_of_bus = 0.03f, of_ohm = 0.5f, of_inductance = 0.5f, of_flux = 0.25f;
-  static constexpr int beyond = 8;  // looks more than those that agree
+  static constexpr int answer_beyond = 8;  // looks more than those that agree
 
   static int grown(int doubt, int by) { return by > 0 ? doubt + by : doubt > 0 ? doubt - 1 : 0; }
 
-  static float permitted_in_silence_A(const float (&read_A)[3], const Look& look) {
-    const Abc wish = inverse_clarke(unpark(look.permitted_A, sin_cos(look.rotor)));
-    const float wish_A[3] = {wish.a, wish.b, wish.c};
-    float most_A = 0.0f;
-    for (int k = 0; k < 3; ++k) {
-      if (within(read_A[k], quiet_A)) most_A = std::fmax(most_A, std::fabs(wish_A[k]));
-    }
-    return most_A;
-  }
   static float unexplained_V(const Look& look, const Motor& m) {
     const float w = look.electrical_rad_per_s;
     const Dq i = look.current_A;
@@ -97,7 +78,7 @@ class Watch {
            of_flux * w * m.flux_Wb;
   }
 
-  int sum_doubt_ = 0, silent_doubt_ = 0, answer_doubt_ = 0;
+  int sum_doubt_ = 0, answer_doubt_ = 0;
 };
 
 }  // namespace firmware
