@@ -7,9 +7,10 @@
 //                                    v                        |
 //   slow_tick  every 10 ms        heat network -> core temperature (+ uncertainty) -> allowance
 //
-// Two hand-overs (heat_, allowance_) and no third. Two axes are two objects. `tick` is for the control interrupt and
-// alone writes the mode; everything else is for one lower context (commands are posted, the next tick obeys). Knows no
-// board, no clock, no host. Each step stands in the file of its name.
+// Two hand-overs (heat_, allowance_) and no third; `watch`, every millisecond, only looks, and posts a trip. Two axes
+// are two objects. `tick` is for the control interrupt and alone writes the mode; everything else is for one lower
+// context (commands are posted, the next tick obeys). Knows no board, no clock, no host. Each step stands in the file
+// of its name.
 #pragma once
 
 #include <atomic>
