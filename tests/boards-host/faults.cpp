@@ -57,11 +57,11 @@ constexpr const char* examples =
     "Examples:\n"
     "  faults                       every fault, three motors, three scenes\n"
     "  faults --only F02 --seeds 20 --runs\n"
-    "  faults --honest 10           hours without a fault: noise, gains apart, offsets that drift; nothing may trip\n"
-    "Elsewhere: F15, F19, F26 and the hangs of F20 are tested in tests/chip, F23 and the frames of F21 in tests/usb,\n"
-    "F29 and the other counters of F17 in tests/firmware.\n"
-    "Exit codes: 0 done, 1 a promise is broken that README does not tell of (--check), or something tripped in vain\n"
-    "(--honest), 2 the command line is wrong.\n";
+    "  faults --honest 10           hours without a fault: noise, gains apart, drift; nothing may trip\n"
+    "Elsewhere: F15, F19, F26 and the hangs of F20 are tested in tests/chip, F23 and the frames of F21\n"
+    "in tests/usb, F29 and the other counters of F17 in tests/firmware.\n"
+    "Exit codes: 0 done, 1 a promise is broken that README does not tell of (--check) or something\n"
+    "tripped in vain (--honest), 2 the command line is wrong.\n";
 
 enum Scenes : unsigned { push = 1, stall = 2, walk = 4, all = 7 };
 
