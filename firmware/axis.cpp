@@ -17,8 +17,10 @@ constexpr float blind_share = 0.6f;    // of the continuous current, while no ho
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
-constexpr float contradiction_A = 1.0f;  // of three sensors: gains apart by 5 % at the peak; noise is a tenth of it
-constexpr float towards_hot = 1.005f;    // mostly, what samples do not show is known to half a percent (losses_test)
+// Of three sensors: four times their noise, and gains apart by some percent. Half an ampere of offset is more heat by a
+// tenth where a small winding is held at its limit.
+constexpr float contradiction_A = 0.2f, contradiction_share = 0.03f;
+constexpr float towards_hot = 1.005f;  // mostly, what samples do not show is known to half a percent (losses_test)
 
 bool usable(const thermal::HeatSet<double>& set) { return thermal::validate(set, thermal::estimator_dt_s).ok(); }
 
@@ -270,6 +272,7 @@ void Axis::obey() {
     setpoint_.discard();
     change(Event::arm);
   }
+  if (asked_for(Command::trip) && (mode_ == Mode::ready || mode_ == Mode::running)) (void)trip(doubted_);
 }
 
 FastView Axis::fast() const {
@@ -318,11 +321,30 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   publish();
 }
 
-/// Squared current that the samples of the last step did not show, from the last of them. The winding is taken as warm
-/// as the hottest phase is believed to be.
-thermal::Unseen Axis::unseen_now() const {
+/// The tick may come in at any place: what it changed under the look is not looked at.
+void Axis::watch() {
+  if (mode_ != Mode::ready && mode_ != Mode::running) return watch_.forget();
+  const std::uint32_t before = heat_.adding().periods;
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  const Watch::Look look = {trace_.phase_A, trace_.current_A, trace_.asked_V,        rotor_.electrical_rad_per_s(),
+                            trace_.bus_V,   trace_.share,     mode_ == Mode::running};
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  if (heat_.adding().periods != before || commands_.load() != 0) return;
+  const FaultRecord found = watch_.judge(look, {warm_ohm(), inductance_H_, flux_Wb_});
+  if (found.fault == wire::Fault::none) return;
+  doubted_ = found;
+  post(Command::trip);
+}
+
+/// The winding is taken as warm as the hottest phase is believed to be.
+float Axis::warm_ohm() const {
   const float warm_K = static_cast<float>(core_.estimate().hottest_degC()) - 25.0f;
-  const float phase_ohm = phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
+  return phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
+}
+
+/// Squared current that the samples of the last step did not show, from the last of them.
+thermal::Unseen Axis::unseen_now() const {
+  const float phase_ohm = warm_ohm();
   const float turn_rad = rotor_.electrical_rad_per_s() * period_s_;
   const SinCos middle = sin_cos(rotor_.half_a_period_before(trace_.rotor_rad));
   const auto phases = [&middle](Dq x) { return inverse_clarke(unpark(x, middle)); };
@@ -342,7 +364,8 @@ thermal::Unseen Axis::unseen_now() const {
 void Axis::add_contradicted(float (&phase_A2)[3]) const {
   const float own_A[3] = {trace_.phase_A.a, trace_.phase_A.b, trace_.phase_A.c};
   const float sum_A = own_A[0] + own_A[1] + own_A[2];
-  if (within(sum_A, contradiction_A)) return;
+  const float largest_A = std::fmax(std::fabs(own_A[0]), std::fmax(std::fabs(own_A[1]), std::fabs(own_A[2])));
+  if (within(sum_A, contradiction_A + contradiction_share * largest_A)) return;
   for (int k = 0; k < 3; ++k) {
     const float others_A = own_A[k] - sum_A, more_A2 = others_A * others_A - own_A[k] * own_A[k];
     if (more_A2 > 0.0f) phase_A2[k] += more_A2;

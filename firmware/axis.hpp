@@ -7,9 +7,10 @@
 //                                    v                        |
 //   slow_tick  every 10 ms        heat network -> core temperature (+ uncertainty) -> allowance
 //
-// Two hand-overs (heat_, allowance_) and no third. Two axes are two objects. `tick` is for the control interrupt and
-// alone writes the mode; everything else is for one lower context (commands are posted, the next tick obeys). Knows no
-// board, no clock, no host. Each step stands in the file of its name.
+// Two hand-overs (heat_, allowance_) and no third; `watch`, every millisecond, only looks, and posts a trip. Two axes
+// are two objects. `tick` is for the control interrupt and alone writes the mode; everything else is for one lower
+// context (commands are posted, the next tick obeys). Knows no board, no clock, no host. Each step stands in the file
+// of its name.
 #pragma once
 
 #include <atomic>
@@ -28,6 +29,7 @@
 #include "firmware/rotor.hpp"
 #include "firmware/setpoint.hpp"
 #include "firmware/signals.hpp"
+#include "firmware/watch.hpp"
 #include "hal/axis_port.hpp"
 #include "hal/board_port.hpp"
 #include "thermal/core_estimator.hpp"
@@ -114,6 +116,8 @@ class Axis {
 
   /// Every 10 ms, from one context below the control interrupt. `board`: what the shared power stage leaves this axis.
   void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board);
+  /// Every millisecond, from the same context: what no single sample shows. Not twice on one sample.
+  void watch();
 
   /// Current command, amperes of phase amplitude (id, iq); keeps the axis alive for setpoint_timeout_s. Wakes an armed
   /// axis. Refused in another control mode.
@@ -166,7 +170,7 @@ class Axis {
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
 
-  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8 };
+  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8, trip = 16 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   void judge(const AxisSetup& setup);
@@ -181,6 +185,7 @@ class Axis {
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   thermal::Unseen unseen_now() const;
+  float warm_ohm() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
   void change(Event event) { mode_ = next(mode_, event); }
@@ -248,6 +253,8 @@ class Axis {
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;
+  Watch watch_;
+  FaultRecord doubted_;  // why `trip` was posted
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The whole driver: two axes on one power stage. A board's control interrupt calls axis(i).tick for each axis, its main
-// loop calls slow_tick every 10 ms; nothing else couples the axes but the heat of the board they share.
-// No statics, no heap: a board owns one Driver, a PC may own many.
+// loop watch every millisecond and slow_tick every 10 ms; nothing else couples the axes but the heat of the board they
+// share. No statics, no heap: a board owns one Driver, a PC may own many.
 #pragma once
 
 #include "firmware/axis.hpp"
@@ -43,6 +43,10 @@ class Driver {
 
   /// Every 10 ms, from one context below the control interrupt.
   void slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSample (&axes)[axis_count]);
+  /// Every millisecond, from the same context.
+  void watch() {
+    for (Axis& axis : axes_) axis.watch();
+  }
   const thermal::BoardHeat& board_heat() const { return board_heat_; }
 
  private:

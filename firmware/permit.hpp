@@ -34,6 +34,8 @@ class Permit {
   /// Without an answer of the slow lane for this long, no more than a share of the continuous current.
   static constexpr float patience_s = 0.03f;
   static constexpr float late_share = 0.6f;
+  /// The speed of a rotor that stands swings about zero by rounding: that is no braking.
+  static constexpr float nothing_A_rad_per_s = 1.0f;
 
   Permit() = default;
   Permit(const AxisParameters& p, const BoardRating& rating)
@@ -58,7 +60,7 @@ class Permit {
     wire::Limit reason = allowance.reason;
     if (allowance_age_periods > patience_periods_) tighten(limit_A, reason, late_A_, wire::Limit::thermal_late);
     if (!easy_bus_V_.holds(bus_V)) [[unlikely]] {
-      const bool brakes = asked.current_A().q * rad_per_s < 0.0f;
+      const bool brakes = asked.current_A().q * rad_per_s < -nothing_A_rad_per_s;
       if (brakes)
         tighten(limit_A, reason, (high_end_V_ - bus_V) * high_A_per_V_, wire::Limit::bus_high);
       else

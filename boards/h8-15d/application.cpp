@@ -186,6 +186,7 @@ void Application::run() {
 }
 
 void Application::every_ms(std::uint32_t ms) {
+  driver_.watch();  // before new setpoints: the last ones have settled
   read_slow_channel();
   look_at_door();
   link_.work(parameter_flash_);

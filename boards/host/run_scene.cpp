@@ -277,6 +277,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
       if (periods_ > warm_up && periods_ % setpoint_periods == 0) speak(traces[i], wishes[i], time_s);
     }
     period();
+    if (periods_ % setpoint_periods == 0) driver_.watch();
     if (periods_ % slow_periods == 0) slow_tick();
     if (periods_ <= warm_up) continue;
 

@@ -109,6 +109,7 @@ class Bench {
   // What a scene may change while it runs.
   Load& load(int axis) { return axes_[axis].motor.load; }
   Bridge& bridge(int axis) { return axes_[axis].bridge; }
+  const Bridge& bridge(int axis) const { return axes_[axis].bridge; }
   Stove& stove(int axis) { return axes_[axis].stove; }
   Motor& motor(int axis) { return axes_[axis].motor; }
   SupplyDesign& supply() { return supply_.design(); }

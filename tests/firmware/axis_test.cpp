@@ -68,6 +68,7 @@ struct Rig {
   void run(int periods) {
     for (int i = 0; i < periods; ++i) {
       tick(motor.sample());
+      if (ticks % 20 == 0) driver.watch();
       if (ticks % 200 == 0 && slow_lane_alive)
         driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{housing_degC, housing_ok}}, {{25.0f, true}}});
     }
@@ -442,6 +443,116 @@ TEST(Axis, NoBitPatternInASampleMakesADutyThatIsNone) {
   }
   EXPECT_GT(tripped, rounds / 100);
   EXPECT_GT(ran, rounds / 20) << "the fuzz must get past the guard to mean anything";
+}
+
+// ---- what a look shows and no sample does ---------------------------------------------------------------------------
+
+struct Watched : Running {
+  /// Milliseconds of spoilt samples until it trips, at most `most`.
+  template <class Spoil>
+  int trips_after_ms(wire::Dq current_A, int most, Spoil spoil) {
+    for (int ms = 1; ms <= most; ++ms) {
+      EXPECT_EQ(axis().set_current(current_A), Status::done);
+      for (int i = 0; i < 20; ++i) spoilt(spoil);
+      driver.watch();
+      spoilt(spoil);  // obeys
+      if (axis().mode() == Mode::tripped) return ms;
+    }
+    return -1;
+  }
+};
+
+TEST_F(Watched, ACurrentSensorThatIsDeadOrStuckOpensTheBridge) {
+  for (const double angle_rad : {0.4, 0.8, 1.2}) {  // phase a carries -4, -6 and -4 A
+    for (const float stuck_A : {0.0f, 3.0f}) {
+      Rig::motor.angle_rad = angle_rad;
+      hold({0.0f, 6.0f}, 1000);
+      const int ms = trips_after_ms({0.0f, 6.0f}, 20, [=](hal::AxisSample& s) { s.current_A.a = stuck_A; });
+      EXPECT_GE(ms, 0) << angle_rad << ' ' << stuck_A;
+      EXPECT_LE(ms, 5) << angle_rad << ' ' << stuck_A;
+      ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+      ASSERT_EQ(axis().clear(), Status::done);
+      run(2400);
+      ASSERT_EQ(axis().arm(), Status::done);
+      run(1);
+    }
+  }
+}
+
+TEST_F(Watched, WhatContradictsStaysLatchedWithItsEvidence) {
+  ASSERT_EQ(trips_after_ms({0.0f, 6.0f}, 20, [](hal::AxisSample& s) { s.current_A.a += 3.0f; }), 3);
+  EXPECT_FALSE(duty.on);
+  const firmware::FaultRecord record = axis().fault();
+  EXPECT_EQ(record.fault, Fault::current_sum);
+  EXPECT_NEAR(record.value, 3.0f, 0.01f);
+  EXPECT_GT(record.threshold, 1.5f);
+  EXPECT_LT(record.threshold, 2.2f);
+  hold({0.0f, 0.0f}, 400);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+}
+
+TEST_F(Watched, APhaseThatCarriesNothingOpensTheBridge) {
+  Rig::motor.angle_rad = 0.5;
+  hold({0.0f, 5.0f}, 1000);
+  const int ms = trips_after_ms({0.0f, 5.0f}, 20, [](hal::AxisSample& s) {
+    s.current_A.a = 0.0f;  // and the other two are one current
+    s.current_A.b = 0.5f * (s.current_A.b - s.current_A.c);
+    s.current_A.c = -s.current_A.b;
+  });
+  EXPECT_GE(ms, 0);
+  EXPECT_LE(ms, 10);
+}
+
+TEST_F(Watched, SamplesOfAMotorAtRestOpenTheBridgeOfOneThatIsDriven) {
+  const int ms = trips_after_ms({0.0f, 5.0f}, 20, [](hal::AxisSample& s) { s.current_A = {0.0f, 0.0f, 0.0f}; });
+  EXPECT_GE(ms, 0);
+  EXPECT_LE(ms, 10);
+  EXPECT_EQ(axis().fault().fault, Fault::motor_differs);
+}
+
+TEST_F(Watched, AnEncoderThatStandsWhileTheRotorTurnsOpensTheBridge) {
+  Rig::motor.rad_per_s = 400.0;
+  hold({0.0f, 5.0f}, 2000);
+  const float stands_rad = Rig::motor.sample().rotor_rad;
+  const int ms = trips_after_ms({0.0f, 5.0f}, 60, [=](hal::AxisSample& s) { s.rotor_rad = stands_rad; });
+  EXPECT_GE(ms, 0);
+  EXPECT_LE(ms, 50);
+}
+
+TEST_F(Watched, GainsApartOffsetsAndNoiseTripNothing) {
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise_A(0.0f, 0.1f);
+  for (const double rad_per_s : {0.0, 40.0, 700.0}) {
+    Rig::motor.rad_per_s = rad_per_s;
+    hold({0.0f, 0.0f}, 400);
+    EXPECT_EQ(trips_after_ms({0.0f, 19.5f}, 1000,
+                             [&](hal::AxisSample& s) {
+                               s.current_A.a = 1.03f * s.current_A.a + 0.2f + noise_A(random);
+                               s.current_A.b = 0.97f * s.current_A.b + 0.2f + noise_A(random);
+                               s.current_A.c = 0.97f * s.current_A.c + 0.2f + noise_A(random);
+                             }),
+              -1)
+        << rad_per_s;
+  }
+}
+
+TEST_F(Watched, OneSpoiltLookInFourTripsNothing) {
+  for (int ms = 0; ms < 1000; ++ms) {
+    ASSERT_EQ(axis().set_current({0.0f, 5.0f}), Status::done);
+    run(20 - ticks % 20 - 1);
+    if (ms % 4 == 0)
+      spoilt([](hal::AxisSample& s) { s.current_A.a += 8.0f; });
+    else
+      run(1);
+    driver.watch();
+  }
+  EXPECT_EQ(axis().mode(), Mode::running);
+}
+
+TEST_F(Watched, WhatIsAtRestIsNotDoubted) {
+  axis().disarm();
+  EXPECT_EQ(trips_after_ms({0.0f, 5.0f}, 50, [](hal::AxisSample& s) { s.current_A.a += 5.0f; }), -1);
+  EXPECT_EQ(axis().mode(), Mode::off);
 }
 
 // ---- setpoint time-out ----------------------------------------------------------------------------------------------

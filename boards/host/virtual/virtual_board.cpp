@@ -85,6 +85,7 @@ void VirtualBoard::advance(int periods) {
     plant_->advance(next);
     ++periods_;
     if (periods_ % frame_periods == 0) {
+      driver_->watch();
       usb_->bus.frame();
       usb_->link.work(flash_);
     }
