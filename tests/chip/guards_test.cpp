@@ -111,6 +111,21 @@ TEST(Guards, OverCurrentOpensTheBridgeBeforeTheFastLaneHasComputed) {
   }
 }
 
+TEST(Guards, ACurrentSensorThatDiesIsFoundByTheOthers) {
+  NEEDS_IMAGE(image);
+  for (int axis : {0, 1}) {
+    auto pcb = driving();
+    pcb->set_current(axis, 4.0f, 0.0f);              // along phase a, where the rotor stands
+    pcb->chip.adc1.force(axis == 0 ? 0 : 10, 2048);  // reads nothing
+    const double begin_s = to_s(pcb->chip.now());
+    while (pcb->duty(axis).on && to_s(pcb->chip.now()) < begin_s + 0.1) pcb->run_for(1e-4);  // setpoints live so long
+    EXPECT_LT(to_s(pcb->chip.now()) - begin_s, 0.02);
+    hold(*pcb, 4.0f, 4.0f, 0.02);
+    EXPECT_EQ(pcb->door().axis[axis].fault.fault, wire::Fault::current_sum);
+    EXPECT_TRUE(pcb->duty(1 - axis).on);
+  }
+}
+
 TEST(Guards, AConverterThatStaysOutOpensTheGates) {  // after two periods
   NEEDS_IMAGE(image);
   auto pcb = driving();
