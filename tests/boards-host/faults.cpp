@@ -197,9 +197,11 @@ std::vector<Row> table() {
       .misses(never, 3, "half an ampere is what honest gains make; its heat is counted");
   row("F05a", "a gain of 0.9", "runs", never, 5).breaks(breaks_a_phase(FaultKind::gain, 0.9));
   row("F05b", "a gain of 0.5", "R2", 2, 5).breaks(breaks_a_phase(FaultKind::gain, 0.5)).shows(current_is_off);
-  row("F06", "current noise times 10", "runs", never, 0).breaks([](Stand& s) {
-    for (const Channel c : currents) s.breaks(c, FaultKind::noise, 10 * s.design().sensors.current_noise_A);
-  });
+  row("F06", "current noise times 10", "runs", never, 0)
+      .breaks([](Stand& s) {
+        for (const Channel c : currents) s.breaks(c, FaultKind::noise, 10 * s.design().sensors.current_noise_A);
+      })
+      .misses(never, 1, "half a kelvin in one run of ninety");
   row("F07a", "two phase currents swapped", "R1", 20 * ms, 1).breaks(swaps_two_phases).shows(current_is_off);
   row("F07b", "sees the other axis' currents and angle", "R1", 20 * ms, 1)
       .breaks(sees_the_other_axis)
@@ -262,10 +264,9 @@ std::vector<Row> table() {
   row("F13b", "C1 30 % less than believed", "runs", never, 10).sets([](Design& d, Random&) {
     d.truth.C1_J_per_K *= 0.7;
   });
-  const auto warm = [](Design& d, Random&) { d.scene.start_degC = 60; };
   row("F13c", "half of the cooling lost", "runs", never, 6)
       .breaks([](Stand& s) { s.bench.stove(0).around.cooling = 0.5; })
-      .sets(warm)
+      .sets([](Design& d, Random&) { d.scene.start_degC = 60; })
       .in(walk, 120)
       .small();
   row("F13d", "10 W from a neighbour", "runs", never, 10)
@@ -300,25 +301,20 @@ std::vector<Row> table() {
     s.turned = [](double) { return std::nan(""); };
   });
   row("F22b", "setpoint +-20 A, 1 Hz to 1 kHz", "runs", never, 2).breaks(turns_the_setpoint_round);
-  row("F22c", "20 A for ever", "runs", never, 2).in(push | stall, 12);
+  row("F22c", "20 A for ever", "runs", never, 2)
+      .in(push | stall, 12)
+      .misses(never, 3, "at some angle of a blocked rotor the limit is passed by 2.2 K, as without a fault");
 
-  const Channel encoder = Channel::encoder;
-  row("F24a", "encoder frozen", "R1", 50 * ms, 2)
-      .breaks(breaks(encoder, FaultKind::stuck))
-      .shows(angle_is_off)
-      .misses(never, 2, "not seen at rest, nor while the back-EMF is within what the resistance may be off by");
-  row("F24b", "encoder jumps by 90 degrees", "R1", 20 * ms, 2)
-      .breaks(breaks(encoder, FaultKind::offset, 1024))
-      .shows(angle_is_off)
-      .misses(never, 2, "not seen at rest, nor while the back-EMF is within what the resistance may be off by");
-  row("F24c", "encoder reversed", "R1", 50 * ms, 2)
-      .breaks(breaks(encoder, FaultKind::gain, -1))
-      .shows(angle_is_off)
-      .misses(never, 2, "not seen at rest, nor while the back-EMF is within what the resistance may be off by");
-  row("F24d", "encoder slips by 200 counts a second", "R1", 50 * ms, 2)
-      .breaks(breaks(encoder, FaultKind::drift, 200))
-      .shows(angle_is_off)
-      .misses(never, 2, "not seen at rest, nor while the back-EMF is within what the resistance may be off by");
+  const auto encoder_row = [&](const char* id, const char* words, double bound_s, FaultKind kind, double value) {
+    row(id, words, "R1", bound_s, 2)
+        .breaks(breaks(Channel::encoder, kind, value))
+        .shows(angle_is_off)
+        .misses(never, 2, "not seen at rest, nor while the back-EMF is within what the resistance may be off by");
+  };
+  encoder_row("F24a", "encoder frozen", 50 * ms, FaultKind::stuck, 0);
+  encoder_row("F24b", "encoder jumps by 90 degrees", 20 * ms, FaultKind::offset, 1024);
+  encoder_row("F24c", "encoder reversed", 50 * ms, FaultKind::gain, -1);
+  encoder_row("F24d", "encoder slips by 200 counts a second", 50 * ms, FaultKind::drift, 200);
 
   row("F25a", "bus dips from 48 to 20 V", "R1", 1 * ms, 0).shows(drives).answers(gives_nothing).breaks([](Stand& s) {
     s.bench.supply().open_V = 20;
