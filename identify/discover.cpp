@@ -6,16 +6,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identify/answer.hpp"
-#include "identify/experiment.hpp"
-#include "identify/gain.hpp"
-#include "identify/held_out.hpp"
-#include "identify/leeway.hpp"
-#include "identify/masks.hpp"
-#include "identify/model_file.hpp"
-#include "identify/refusals.hpp"
-#include "identify/replayed.hpp"
-#include "identify/search.hpp"
+#include "identify/answer/answer.hpp"
+#include "identify/answer/experiment.hpp"
+#include "identify/answer/gain.hpp"
+#include "identify/answer/held_out.hpp"
+#include "identify/answer/model_file.hpp"
+#include "identify/answer/refusals.hpp"
+#include "identify/fit/leeway.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/log/masks.hpp"
+#include "identify/search/problem_of.hpp"
+#include "identify/search/search.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace identify {

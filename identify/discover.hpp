@@ -2,8 +2,8 @@
 // From logs to a report: fit, judge, name, extend, measure the gain.
 #pragma once
 
-#include "identify/doing.hpp"
-#include "identify/held_out.hpp"
+#include "identify/answer/held_out.hpp"
+#include "identify/search/doing.hpp"
 
 namespace identify {
 

@@ -9,8 +9,8 @@
 #include <filesystem>
 
 #include "identify/discover.hpp"
-#include "identify/doing.hpp"
 #include "identify/score_logs.hpp"
+#include "identify/search/doing.hpp"
 #include "wire/pc/files.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"

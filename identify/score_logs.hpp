@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "identify/report.hpp"
+#include "identify/answer/report.hpp"
 
 namespace identify {
 

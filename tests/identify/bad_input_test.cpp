@@ -9,11 +9,11 @@
 #include <random>
 #include <sstream>
 
+#include "identify/answer/refusals.hpp"
+#include "identify/answer/report.hpp"
 #include "identify/discover.hpp"
-#include "identify/fit.hpp"
-#include "identify/problem.hpp"
-#include "identify/refusals.hpp"
-#include "identify/report.hpp"
+#include "identify/fit/fit.hpp"
+#include "identify/search/problem_of.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/program.hpp"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "identify/log.hpp"
-#include "identify/table.hpp"
+#include "identify/log/log.hpp"
+#include "identify/log/table.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "wire/pc/motor_file.hpp"
 

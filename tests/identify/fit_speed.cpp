@@ -11,9 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "identify/parallel.hpp"
-#include "identify/search.hpp"
-#include "identify/table.hpp"
+#include "identify/fit/parallel.hpp"
+#include "identify/log/table.hpp"
+#include "identify/search/problem_of.hpp"
+#include "identify/search/search.hpp"
 #include "tests/identify/bench_log.hpp"
 #include "wire/pc/motor_file.hpp"
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include "identify/fit.hpp"
+#include "identify/fit/fit.hpp"
 
 #include <gtest/gtest.h>
 
-#include "identify/baseline.hpp"
-#include "identify/candidates.hpp"
-#include "identify/leeway.hpp"
-#include "identify/misfit.hpp"
-#include "identify/replay.hpp"
-#include "identify/replayed.hpp"
-#include "identify/structure.hpp"
-#include "identify/table.hpp"
+#include "identify/answer/baseline.hpp"
+#include "identify/answer/structure.hpp"
+#include "identify/fit/leeway.hpp"
+#include "identify/fit/misfit.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/log/table.hpp"
+#include "identify/model/replay.hpp"
+#include "identify/search/candidates.hpp"
+#include "identify/search/problem_of.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
 

@@ -8,11 +8,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "identify/answer/held_out.hpp"
+#include "identify/answer/report.hpp"
 #include "identify/discover.hpp"
-#include "identify/fit.hpp"
-#include "identify/held_out.hpp"
-#include "identify/problem.hpp"
-#include "identify/report.hpp"
+#include "identify/fit/fit.hpp"
+#include "identify/search/problem_of.hpp"
 #include "tests/identify/program.hpp"
 #include "tests/identify/says.hpp"
 #include "tests/identify/traction.hpp"

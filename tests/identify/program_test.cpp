@@ -12,10 +12,10 @@
 #include <random>
 #include <thread>
 
+#include "identify/answer/held_out.hpp"
 #include "identify/discover.hpp"
-#include "identify/doing.hpp"
-#include "identify/held_out.hpp"
-#include "identify/parallel.hpp"
+#include "identify/fit/parallel.hpp"
+#include "identify/search/doing.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
 

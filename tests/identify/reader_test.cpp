@@ -9,10 +9,10 @@
 #include <functional>
 #include <random>
 
-#include "identify/filled.hpp"
-#include "identify/log.hpp"
-#include "identify/masks.hpp"
-#include "identify/units.hpp"
+#include "identify/log/filled.hpp"
+#include "identify/log/log.hpp"
+#include "identify/log/masks.hpp"
+#include "identify/log/units.hpp"
 #include "tests/identify/says.hpp"
 #include "wire/pc/user_error.hpp"
 

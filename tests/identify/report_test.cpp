@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "identify/report.hpp"
+#include "identify/answer/report.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -9,15 +9,15 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "identify/answer.hpp"
-#include "identify/baseline.hpp"
+#include "identify/answer/answer.hpp"
+#include "identify/answer/baseline.hpp"
+#include "identify/answer/gain.hpp"
+#include "identify/answer/held_out.hpp"
 #include "identify/discover.hpp"
-#include "identify/fit.hpp"
-#include "identify/gain.hpp"
-#include "identify/held_out.hpp"
-#include "identify/leeway.hpp"
-#include "identify/problem.hpp"
-#include "identify/replayed.hpp"
+#include "identify/fit/fit.hpp"
+#include "identify/fit/leeway.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/search/problem_of.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/says.hpp"
 

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <ctime>
 
-#include "identify/answer.hpp"
+#include "identify/answer/answer.hpp"
+#include "identify/answer/experiment.hpp"
 #include "identify/discover.hpp"
-#include "identify/experiment.hpp"
-#include "identify/leeway.hpp"
-#include "identify/replayed.hpp"
-#include "identify/table.hpp"
+#include "identify/fit/leeway.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/log/table.hpp"
+#include "identify/search/problem_of.hpp"
 
 namespace tests {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "identify/search.hpp"
+#include "identify/search/search.hpp"
 #include "tests/identify/hidden_log.hpp"
 
 namespace tests {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Effects hidden by host-sim's stove are found; what is not there is not. A handful of cases of the score
 // (build/host/bin/score prints the whole table), with fixed seeds against regressions.
-#include "identify/search.hpp"
+#include "identify/search/search.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -15,15 +15,16 @@
 #include <utility>
 
 #include "host-sim/plant/hidden_causes.hpp"
-#include "identify/answer.hpp"
-#include "identify/baseline.hpp"
+#include "identify/answer/answer.hpp"
+#include "identify/answer/baseline.hpp"
+#include "identify/answer/experiment.hpp"
+#include "identify/answer/model_file.hpp"
 #include "identify/discover.hpp"
-#include "identify/experiment.hpp"
-#include "identify/leeway.hpp"
-#include "identify/model_file.hpp"
-#include "identify/parallel.hpp"
-#include "identify/replayed.hpp"
-#include "identify/table.hpp"
+#include "identify/fit/leeway.hpp"
+#include "identify/fit/parallel.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/log/table.hpp"
+#include "identify/search/problem_of.hpp"
 #include "tests/identify/bench.hpp"
 #include "tests/identify/hidden_log.hpp"
 #include "tests/identify/says.hpp"

@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "identify/discover.hpp"
-#include "identify/median.hpp"
+#include "identify/log/median.hpp"
 #include "tests/identify/chance.hpp"
 
 int main(int argc, char** argv) {

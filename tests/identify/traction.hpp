@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "identify/log.hpp"
-#include "identify/table.hpp"
+#include "identify/log/log.hpp"
+#include "identify/log/table.hpp"
 
 namespace tests {
 

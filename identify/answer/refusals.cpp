@@ -1,0 +1,563 @@
+// SPDX-License-Identifier: MIT
+#include "identify/answer/refusals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <random>
+
+#include "identify/answer/baseline.hpp"
+#include "identify/fit/parallel.hpp"
+#include "identify/fit/replayed.hpp"
+#include "identify/log/filled.hpp"
+#include "identify/log/impossible.hpp"
+#include "identify/log/pauses.hpp"
+#include "identify/log/units.hpp"
+#include "identify/search/disturbance.hpp"
+#include "identify/search/problem_of.hpp"
+
+namespace identify {
+namespace {
+
+using thermal::Drive;
+
+std::string in_milliseconds(const Log& log) {
+  return fmt::format(
+      "Read in milliseconds, or less, the time column makes a motor that follows the load, and in seconds none; say "
+      "{}, or :us.",
+      column_in(log, Role::time, "ms"));
+}
+
+/// What follows the load where it is read otherwise leaves clearly less than the best as it stands, a likelihood e^20
+/// times as great where a mistaken unit makes it e^100 and more, and a fraction of what two resistors leave.
+constexpr double clearly = 20, fraction_left = 0.25;
+
+/// Are R2 and C2 known from this data?
+bool determines_housing(const Problem& problem, const Fit& f) {
+  const auto lines = base_lines(problem, f, std::max(1.0, f.ratio()));
+  return lines[1].determined && lines[3].determined;
+}
+
+/// A motor a thousand times as slow fits as well where no sheet says otherwise. A housing of 28 hours is none: a
+/// traction machine of 50 kW settles within hours.
+bool far_too_slow(const Problem& problem, const Fit& f) {
+  const Physical p = physical(f.x);
+  return !problem.belief.known && p.R2_K_per_W * p.C2_J_per_K > 1e5 && determines_housing(problem, f);
+}
+
+/// Of all its parts: what hangs on the housing, or is hot in the winding, may take up most of the heat.
+double heat_capacity_J_per_K(const Problem& problem, const Fit& f) {
+  const Physical p = physical(f.x);
+  double out = p.C1_J_per_K + p.C2_J_per_K;
+  Eigen::Index at = base_count;
+  for (const Chosen& chosen : f.chosen) {
+    const Cause& cause = cause_of(chosen);
+    for (std::size_t i = 0; i < cause.parameters.size(); ++i, ++at) {
+      if (std::string_view(cause.parameters[i].unit) == "J/K")
+        out += parameter_value(problem, cause, static_cast<int>(i), f.x[at]);
+    }
+  }
+  return out;
+}
+
+/// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
+/// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
+/// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
+std::string unlike_the_motor(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
+  const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
+    const double settles_s = physical(f->x).R2_K_per_W * heat_capacity_J_per_K(problem, *f);
+    if (in_air && settles_s < 20 && determines_housing(problem, *f))
+      return fmt::format(
+          "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
+          "{}{}.",
+          column_in(logs.front(), Role::time, "min"),
+          problem.logs.front().sink_assumed ? ", and if the log begins warm say how warm the room is, --ambient DEGC"
+                                            : "");
+  }
+  if (!problem.belief.known) return "";
+  // Where something else is wrong, what heats slowly may pass for a winding: masses change places. Windings shipped are
+  // within a factor of two of their sheet. A hot spot beside it may be the winding, and what is heavy its teeth.
+  constexpr double much = 5;
+  const ParameterLine C1 = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()))[2];
+  const bool none_faster = coordinate_of(found.chosen.fit, Edit::hot_spot) < 0;
+  if (!found.chosen.fit.chosen.empty() && none_faster && C1.determined && C1.value > much * problem.belief.C1_J_per_K)
+    return fmt::format(
+        "Beside {} the winding would take up {:.3g} J/K, {:.2g} times its sheet: another mass stands in its place. "
+        "Read the winding{}, or see whether {} is this motor.",
+        fmt::join(names_of(found.chosen.fit.chosen), " and "), C1.value, C1.value / problem.belief.C1_J_per_K,
+        problem.any_core() ? " more often" : " (core_degC or winding_ohm)", problem.belief.motor);
+  const auto lines = base_lines(problem, found.chosen.fit, 1);
+  const Physical p = physical(found.chosen.fit.x);
+  const bool off[] = {true, p.R2_K_per_W > problem.belief.R2_K_per_W, true, p.C2_J_per_K < problem.belief.C2_J_per_K};
+  for (std::size_t i = 0; i < std::size(off); ++i) {
+    const ParameterLine& line = lines[i];
+    if (off[i] && line.at_bound)
+      return fmt::format(
+          "{} would be {:.3g} {}, 30 times off the sheet: see whether {} is this motor, current_A its own current, "
+          "core_degC and housing_degC two sensors; or leave --motor away.",
+          line.name, line.value, line.unit, problem.belief.motor);
+  }
+  return "";
+}
+
+/// What a fit misses over what noise alone would leave.
+double excess(const Fit& f) { return f.misfit - 0.5 * f.readings; }
+
+/// Nonsense is nonsense in long bins too: a reading that leaves more than `look_share` there of what two resistors
+/// leave is not tried any further. Twice what is asked in the end; a log of 20 min has hardly more bins.
+constexpr std::size_t look_bins = 4000;
+constexpr double look_share = 2 * fraction_left;
+Problem in_long_bins(Problem problem) {
+  std::size_t bins = 0;
+  for (const Bins& log : problem.logs) bins += log.bins.size();
+  for (Bins& log : problem.logs) log = merged(log, 1 + bins / look_bins);
+  return problem;
+}
+
+/// What two resistors leave there.
+double left_in_a_look(const Problem& problem, const Found& found) {
+  return excess(fit(in_long_bins(problem), {}, {&found.plain_baseline}));
+}
+
+/// The logs with these columns read in this unit.
+std::vector<Log> read_in(const Unit& unit, const std::vector<Role>& roles, std::vector<Log> logs) {
+  for (Log& log : logs) {
+    for (const Role role : roles) {
+      for (double& x : log.of(role)) x = unit.factor * (x + unit.offset);
+    }
+  }
+  return logs;
+}
+
+/// Two columns swapped, a temperature in Fahrenheit, time in milliseconds? Then two resistors, or one cause, on the
+/// columns read otherwise leave less than the best cause does on these. Empty when nothing helps.
+std::string misread_columns(const Problem& problem, const Found& found, const std::vector<Log>& logs,
+                            const std::optional<wire::pc::MotorFile>& motor) {
+  // All to the noise of the recording, and over it: what was found may count as noise what it could not explain.
+  const auto left_by = [&](const Fit& f) { return excess(fit(problem, f.chosen, {&f})); };
+  const Fit& plain = found.plain_baseline;
+  const double as_it_stands = excess(plain), by_one = left_by(found.singles.front().fit);
+  const double in_a_look = left_in_a_look(problem, found);
+  const auto leaves_less = [&](const Problem& read, const std::vector<Chosen>& chosen, double explained) {
+    const Fit look = fit(in_long_bins(read), chosen);
+    if (!look.valid() || excess(look) > look_share * in_a_look) return false;
+    const double left = excess(fit(read, chosen));
+    return left + clearly < explained && left < fraction_left * as_it_stands;
+  };
+  const auto follows_better = [&](const std::vector<Log>& otherwise, double explained) {
+    const Problem read = problem_of(otherwise, motor);
+    return leaves_less(read, {}, explained) || leaves_less(read, best_alone(read).chosen, explained);
+  };
+  const bool turns = std::all_of(logs.begin(), logs.end(), [](const Log& log) {
+    return log.has(Role::current) && largest_magnitude(log.of(Role::speed)) > 0;
+  });
+  // Where speed tells the current, with less noise, the temperatures follow either.
+  const bool either =
+      std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.noisy_share < 1; });
+  if (turns && !either && !problem.heated_by_power()) {
+    std::vector<Log> swapped = logs;
+    for (Log& log : swapped) std::swap(log.of(Role::current), log.of(Role::speed));
+    // Of a unit that would prove nothing: a gain and an offset imitate Fahrenheit.
+    const double explained = std::min(by_one, left_by(found.chosen.fit));
+    if (leaves_less(problem_of(swapped, motor), {}, explained))
+      return "The temperatures follow the square of the speed column and not that of the current: the two columns are "
+             "swapped; map them with --column.";
+  }
+  // Both masses as large as they may be: a motor that answers far too slowly.
+  const auto at_most = [&](Eigen::Index i, double believed) {
+    return plain.at_bound[static_cast<std::size_t>(i)] && std::exp(plain.x[i]) > believed;
+  };
+  if (at_most(2, problem.belief.C1_J_per_K) && at_most(3, problem.belief.C2_J_per_K) &&
+      follows_better(read_in(*unit_named("ms"), {Role::time}, logs), by_one))
+    return in_milliseconds(logs.front());
+  // A column that is ever below 50 would be below 10 degC: no room where motors are measured. Nor is what heats colder
+  // than what cools it: a log that begins warm would be.
+  const Unit degF = *unit_named("degF");
+  const auto may_be_fahrenheit = [&](Role role) {
+    return std::all_of(logs.begin(), logs.end(), [&](const Log& log) {
+      constexpr double sensors_K = 3;  // two may differ by
+      const double least = lowest(log.of(role)), sink_degC = lowest(log.of(sink_of(log)));
+      return log.has(role) && least >= 50 && !(degF.factor * (least + degF.offset) < sink_degC - sensors_K);
+    });
+  };
+  // What was found may imitate it, by a gain and an offset, or be what is true.
+  const double explained = std::min(by_one, left_by(found.chosen.fit) + 2 * clearly);
+  const std::vector<Role> together[] = {{Role::housing}, {Role::core}, {Role::housing, Role::core}};
+  for (const std::vector<Role>& roles : together) {
+    if (!std::all_of(roles.begin(), roles.end(), may_be_fahrenheit) ||
+        !follows_better(read_in(degF, roles, logs), explained))
+      continue;
+    std::string columns;
+    for (const Role role : roles) columns += " " + column_in(logs.front(), role, "degF");
+    return fmt::format("Read as Fahrenheit a temperature column follows the load, and as Celsius it does not; say{}.",
+                       columns);
+  }
+  return "";
+}
+
+/// The same logs with the load so many seconds later, or sooner where that is negative, without the rows that then have
+/// none or nothing else. None where that would leave less than three quarters of a log, or a pause stands in it.
+std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs) {
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const auto rows = static_cast<std::ptrdiff_t>(std::abs(late_s) / problem.logs[l].interval_s);
+    if (4 * rows > std::ssize(logs[l].of(Role::time)) || !logs[l].resumes_s.empty()) return {};
+    for (std::size_t role = 0; role < role_count; ++role) {
+      std::vector<double>& column = logs[l].columns[role];
+      if (column.empty()) continue;
+      const bool load =
+          std::find(std::begin(load_roles), std::end(load_roles), static_cast<Role>(role)) != std::end(load_roles);
+      // Time goes on from zero either way.
+      if (static_cast<Role>(role) == Role::time || load == (late_s > 0))
+        column.erase(column.end() - rows, column.end());
+      else
+        column.erase(column.begin(), column.begin() + rows);
+    }
+  }
+  return logs;
+}
+
+/// Of two clocks farther apart than a clock_delay may be: by how much the temperatures are late; 0: by none. Until they
+/// are put right, a motor that warms where nothing flows makes rest look noisy.
+double clocks_apart_s(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
+  const Chosen clock = {cause_named("clock_delay"), -1};
+  const double reach_s = cause_of(clock).parameters[0].high;
+  double late_s = 0, least = fraction_left * excess(found.plain_baseline);
+  for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
+    least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
+  const double in_a_look = left_in_a_look(problem, found);
+  const double tried_s[] = {-4 * reach_s, -2 * reach_s, 2 * reach_s, 4 * reach_s};
+  Fit fits[std::size(tried_s)];
+  in_parallel(std::size(tried_s), [&](std::size_t i) {
+    const std::vector<Log> moved = loaded_later(tried_s[i], problem, logs);
+    if (moved.empty()) return;
+    const Problem apart = unseen_by(problem, moved);
+    const Fit look = fit(in_long_bins(apart), {clock});
+    if (look.valid() && excess(look) < look_share * in_a_look) fits[i] = fit(apart, {clock});
+  });
+  for (std::size_t i = 0; i < std::size(tried_s); ++i) {
+    if (!fits[i].valid() || excess(fits[i]) >= least) continue;
+    least = excess(fits[i]);
+    late_s = tried_s[i] + fits[i].x[coordinate_of(fits[i], Edit::delay)];
+  }
+  return late_s;
+}
+
+/// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?
+bool follows_better_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
+                            const std::optional<wire::pc::MotorFile>& motor) {
+  for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
+  const Problem swapped = problem_of(logs, motor);
+  const auto left_by_best = [&](const Problem& p) { return excess(fit(p, best.chosen, {&best})); };
+  const double in_a_look = left_by_best(in_long_bins(problem));
+  if (!(excess(best_alone(in_long_bins(swapped))) < in_a_look + std::abs(in_a_look) + clearly)) return false;
+  const double left = left_by_best(problem);
+  return excess(best_alone(swapped)) + clearly < std::min(left, fraction_left * left);
+}
+
+/// As it was told last, and as it is told next, where that is not now.
+std::vector<double> told_last(std::vector<double> load) {
+  for (std::size_t i = 1; i < load.size(); ++i) {
+    if (std::isnan(load[i])) load[i] = load[i - 1];
+  }
+  return load;
+}
+std::vector<double> told_next(std::vector<double> load) {
+  for (std::size_t i = load.size(); i-- > 1;) {
+    if (std::isnan(load[i - 1])) load[i - 1] = load[i];
+  }
+  return load;
+}
+
+/// A row sooner than that.
+std::vector<double> told_sooner(std::vector<double> load) { return a_row_sooner(told_next(std::move(load))); }
+
+/// As it was told last, but for where it steps: there drawn, last or a row sooner, or the `other` of the two. A load
+/// that goes smoothly does not. Of columns that tell one current together, alike.
+std::vector<double> told_either(std::vector<double> load, unsigned draw, bool other) {
+  constexpr double steps = 2;  // times what it changes by in the rows before and after, and more
+  std::mt19937 random(draw);
+  std::vector<double> out = told_last(load);
+  const std::vector<double> last = out, sooner = told_sooner(std::move(load));
+  const auto change = [&](std::size_t i) { return i + 1 < last.size() ? std::abs(last[i + 1] - last[i]) : 0; };
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const bool drawn = (random() % 2 == 0) != other;
+    if (drawn && change(i) > steps * std::max(i > 0 ? change(i - 1) : 0, change(i + 1))) out[i] = sooner[i];
+  }
+  return out;
+}
+
+/// In each row the most, or the least, that it and its neighbours tell: what flowed, if rows keep step with a gait.
+std::vector<double> told_around(const std::vector<double>& load, bool most) {
+  const std::vector<double> told = told_next(load);
+  std::vector<double> out = told;
+  for (std::size_t i = 1; i + 1 < told.size(); ++i) {
+    for (const double x : {told[i - 1], told[i + 1]}) {
+      if (most ? std::abs(x) > std::abs(out[i]) : std::abs(x) < std::abs(out[i])) out[i] = x;
+    }
+  }
+  return out;
+}
+std::vector<double> told_at_crests(std::vector<double> load) { return told_around(load, true); }
+std::vector<double> told_in_troughs(std::vector<double> load) { return told_around(load, false); }
+
+/// The same logs under a load that is `as` makes it of what was measured.
+Problem under(const Problem& problem, std::vector<Log> logs,
+              const std::function<std::vector<double>(std::vector<double>)>& as) {
+  for (Log& log : logs) {
+    for (const Role role : {Role::power, Role::current, Role::iq, Role::id}) {
+      if (log.has(role)) log.of(role) = as(without_lines(log, role));
+    }
+  }
+  return unseen_by(problem, logs);
+}
+
+/// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it.
+double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs) {
+  const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
+                sooner = under(problem, logs, told_sooner);
+  std::vector<Problem> drawn;  // pairs: one may end where it began by chance
+  for (unsigned i = 0; i < 8; ++i) {
+    drawn.push_back(under(problem, logs,
+                          [&](std::vector<double> load) { return told_either(std::move(load), i / 2, i % 2 == 1); }));
+  }
+  double moved2 = 0, drawn2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const auto of = problem.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
+    const auto run = [&](const Problem& p) { return replayed(p, baseline, l).*of; };
+    const std::vector<double> line = run(problem), a = run(last), b = run(next), c = run(sooner);
+    std::vector<std::vector<double>> draws;
+    std::transform(drawn.begin(), drawn.end(), std::back_inserter(draws), run);
+    for (std::size_t k = 0; k < line.size(); ++k) {
+      // A line across a step heats less than the step; by a part of all heat, a fit takes that for the motor's.
+      const double less_K = (a[k] + b[k]) / 2 - line[k], rise_K = line[k] - line[0];
+      moved2 += (a[k] - c[k]) * (a[k] - c[k]);
+      for (std::size_t i = 0; i < draws.size(); i += 2) {
+        const double off_K = (draws[i][k] - draws[i + 1][k]) / 2;
+        drawn2 += off_K * off_K / (static_cast<double>(draws.size()) / 2);
+      }
+      less2 += less_K * less_K;
+      less_rise += less_K * rise_K;
+      rise2 += rise_K * rise_K;
+      ++bins;
+    }
+  }
+  // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12): all steps alike,
+  // or each for itself, where their heat no longer adds up. Drawn was one end or the other, half the interval off.
+  return std::sqrt((moved2 / 12 + drawn2 / 3 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
+}
+
+/// Does the load alternate faster than rows are written, so that each is a draw? From one row to the next but one a
+/// load that steps changes twice as much, squared, as from row to row, and one that goes smoothly four times. What is
+/// small beside all heat is noise.
+bool alternates_between_rows(const std::vector<Log>& logs) {
+  constexpr double least = 1.7;  // of white noise it is 1, of gaits of 0.8 to 2 Hz in rows of a second 1.1 to 1.6
+  constexpr double much = 0.1;   // of gaits of 0.6 to 6 Hz in rows of 0.1 to 2 s 0.3 to 0.7
+  double once = 0, twice = 0, all = 0;
+  for (const Log& log : logs) {
+    std::vector<double> heat = told_next(log.of(heat_of(log)));
+    if (!log.has(Role::power)) std::transform(heat.begin(), heat.end(), heat.begin(), [](double A) { return A * A; });
+    for (std::size_t i = 2; i < heat.size(); ++i) {
+      const double one = heat[i] - heat[i - 1], two = heat[i] - heat[i - 2];
+      if (!std::isnan(one) && !std::isnan(two)) once += one * one, twice += two * two, all += heat[i] * heat[i];
+    }
+  }
+  return twice < least * once && once > much * all;
+}
+
+/// How far two simulations of the logs' housings differ, rms; of their windings, where no housing was read.
+double apart_K(const Problem& a, const Fit& fit_a, const Problem& b, const Fit& fit_b) {
+  double square = 0, bins = 0;
+  for (std::size_t l = 0; l < a.logs.size(); ++l) {
+    const auto of = a.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
+    const std::vector<double> one = replayed(a, fit_a, l).*of, other = replayed(b, fit_b, l).*of;
+    for (std::size_t k = 0; k < one.size(); ++k) square += (one[k] - other[k]) * (one[k] - other[k]);
+    bins += static_cast<double>(one.size());
+  }
+  return std::sqrt(square / bins);
+}
+
+/// From half a minute to the next the heat stays within a fifth, and so it does from log to log.
+bool never_changes(const Problem& problem) {
+  constexpr double same = 0.8;
+  double least = 1e300, most = 0;
+  for (const Bins& log : problem.logs) {
+    const double together_s = std::min(30.0, log.duration_s() / 20);
+    const Bins coarse = merged(log, static_cast<std::size_t>(std::max(1.0, std::round(together_s / log.width_s))));
+    for (const Bin& bin : coarse.bins) {
+      const double heat = std::abs(bin.input[log.has_power ? Drive::power_W : Drive::current_A2]);
+      least = std::min(least, heat), most = std::max(most, heat);
+    }
+  }
+  return least > same * most;
+}
+
+}  // namespace
+
+std::string too_poor(const Problem& problem) {
+  // Cautious: of two hidden logs both were named rightly with three fifths of the housing's readings gone at random; of
+  // the load a seventh was too much already (masks.cpp), and of gaps three, 22 s of 20 min.
+  constexpr double most_missing = 0.35, most_in_gaps = 0.3;
+  constexpr double least_span_K = 2;  // a thermistor wanders by 0.05 K: resistances are then known to 3 percent at best
+  double span = 0;
+  for (const Bins& log : problem.logs) {
+    if (log.missing_share > most_missing)
+      return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
+                         100 * log.missing_share);
+    if (log.gap_share > most_in_gaps)
+      return fmt::format("{}: gaps make up {:.0f} % of its time; record it again.", log.name, 100 * log.gap_share);
+    double low = 1e300, high = -1e300;
+    for (const Bin& bin : log.bins) {
+      const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
+      if (!std::isnan(T)) low = std::min(low, T), high = std::max(high, T);
+    }
+    span = std::max(span, high - low);
+  }
+  // Four parameters and two initial temperatures follow any few readings; some must be left to judge by.
+  for (const Bins& log : problem.logs) {
+    float housing = 0, core = 0;
+    for (const Bin& bin : log.bins) housing += bin.housing_n, core += bin.core_n;
+    const float least = log.housing_step_K == 0 ? 20 : 10;  // a step tells its moment, and no noise hides it
+    if (std::max(housing, core) < least)
+      return fmt::format("{}: {:.0f} readings of a temperature are too few, {:.0f} the least; read it more often.",
+                         log.name, static_cast<double>(std::max(housing, core)), static_cast<double>(least));
+  }
+  if (span == 0)
+    return "The temperature is the same in all rows, as of a sensor that does not work; see whether it is connected.";
+  if (span < least_span_K)
+    return fmt::format("The temperatures move by {:.1f} K only; load the motor until it is warm.", span);
+  return "";
+}
+
+std::string too_short(const Problem& problem, const Found& found) {
+  const Fit& plain = found.plain_baseline;
+  // A baseline that is wrong may stretch its time constant without end; what the search started from may not. Logs that
+  // differ in their cooling (a fan) have no time constant in common: the shortest that one of them determines counts.
+  const auto time_constant_s = [](const Fit& f) {
+    const Physical p = physical(f.x);
+    return p.R2_K_per_W * p.C2_J_per_K;
+  };
+  double housing_s = std::min(time_constant_s(plain), problem.belief.R2_K_per_W * problem.belief.C2_J_per_K);
+  for (std::size_t l = 0; problem.logs.size() > 1 && l < problem.logs.size(); ++l) {
+    Problem one = problem;
+    one.logs = {problem.logs[l]};
+    const Fit alone = fit(one, {});
+    if (alone.valid() && determines_housing(one, alone)) housing_s = std::min(housing_s, time_constant_s(alone));
+  }
+  // Two resistors that miss much may see no cooling, or a slow one, where the causes found let it be seen.
+  const bool explains = found.verdict != Verdict::adequate && found.verdict != Verdict::unknown_cause;
+  if (explains && determines_housing(problem, found.chosen.fit))
+    housing_s = std::min(housing_s, time_constant_s(found.chosen.fit));
+  double lasts_s = 0;
+  for (const Bins& log : problem.logs) lasts_s += log.duration_s();
+  if (lasts_s < housing_s) {
+    const bool known = problem.belief.known || determines_housing(problem, plain);
+    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", lasts_s,
+                       known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
+  }
+  const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };
+  if ((found.verdict == Verdict::adequate && !settles(plain)) || (explains && !settles(found.chosen.fit)))
+    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
+  if (never_changes(problem))
+    return "The load never changes, so heat and cooling cannot be told apart; record rests between loads of several "
+           "sizes.";
+  return "";
+}
+
+std::string suspicion(const Problem& problem, const Found& found, const std::vector<Log>& logs,
+                      const std::optional<wire::pc::MotorFile>& motor) {
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
+    if (far_too_slow(problem, *f)) return in_milliseconds(logs.front());
+  }
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
+  // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
+  const Fit& best = found.singles.front().fit;
+  if (const double late_s = clocks_apart_s(problem, found, logs); late_s != 0)
+    return fmt::format("The temperatures follow the current {:.0f} s {}: two clocks; align the recordings first.",
+                       std::abs(late_s), late_s > 0 ? "late" : "early");
+  const int delay = coordinate_of(best, Edit::delay);
+  if (delay >= 0 && best.at_bound[static_cast<std::size_t>(delay)]) {
+    return fmt::format("Temperatures and current are more than {:.0f} s apart: two clocks; align the recordings first.",
+                       cause_of(best.chosen.front()).parameters[0].high);
+  }
+  return misread_columns(problem, found, logs, motor);
+}
+
+std::string clipped(const Found& found, const std::vector<Log>& logs) {
+  if (found.verdict == Verdict::adequate) return "";
+  constexpr double least_share = 0.005, often = 3;  // of the rows; times as often as any other value is told
+  for (const Log& log : logs) {
+    for (const Role role : {Role::current, Role::iq, Role::power}) {
+      const double top = largest_magnitude(log.of(role));
+      std::map<double, int> rows;
+      std::vector<double> below;
+      for (const double x : log.of(role)) {
+        if (std::abs(x) > 0.1 * top) ++rows[std::abs(x)];
+        below.push_back(std::abs(x) == top ? missing : x);
+      }
+      if (rows.size() < 2) continue;
+      const int at_top = rows.rbegin()->second;
+      rows.erase(top);
+      const auto most =
+          std::max_element(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+      if (at_top < least_share * static_cast<double>(below.size()) || at_top < often * most->second ||
+          !is_noisy(below, top))
+        continue;
+      return fmt::format(
+          "{} stands at its largest value, {:g}, in {} rows and is noisy elsewhere: its sensor seems to reach no "
+          "further, so what flowed then is not known; record it with a wider range.",
+          own_name(role), top, at_top);
+    }
+  }
+  return "";
+}
+
+std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
+  if (found.verdict == Verdict::adequate) return "";
+  const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
+  double open_K = left_open_K(problem, baseline, logs);
+  if (alternates_between_rows(logs))
+    open_K = std::max(open_K, 0.5 * apart_K(under(problem, logs, told_at_crests), baseline,
+                                            under(problem, logs, told_in_troughs), baseline));
+  // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
+  const bool unknown = found.verdict == Verdict::unknown_cause;
+  const double asked_K = unknown ? disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K
+                                 : apart_K(problem, baseline, problem, chosen);
+  // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
+  // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
+  constexpr double times = 2.5, worth_K = 0.02;
+  if (std::min(open_K, asked_K) < worth_K || asked_K > times * open_K) return "";
+  double apart_s = 0;
+  for (const Bins& log : problem.logs) apart_s = std::max(apart_s, log.interval_s);
+  return fmt::format(
+      "What {}, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
+      "in cells that were not measured, and when exactly moves the {} by as much; record the {} in every row and "
+      "more often.",
+      unknown ? "no cause explains" : "was found beside two resistors", asked_K, apart_s,
+      problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
+}
+
+std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,
+                                        const std::optional<wire::pc::MotorFile>& motor) {
+  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
+  const Fit& best = found.singles.front().fit;
+  const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
+                                [](const Bins& log) { return log.has_core && log.has_housing; });
+  double winding_of_housing = 0;  // a cause may imitate what the other column was
+  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
+    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
+  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
+      follows_better_swapped(problem, best, logs, motor)) {
+    return fmt::format(
+        "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
+        "housing_degC are swapped.",
+        winding_of_housing);
+  }
+  return unlike_the_motor(problem, found, logs);
+}
+
+}  // namespace identify

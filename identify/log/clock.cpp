@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include "identify/log/clock.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identify/log/median.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+namespace {
+
+using wire::pc::refuse_data;
+
+}  // namespace
+
+void check_epoch(const Log& log, double first_cell) {
+  if (log.of(Role::time).front() < 1e11) return;
+  const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
+  refuse_data(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say {}.", log.name, first_cell,
+                          unit, column_in(log, Role::time, unit)));
+}
+
+void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows) {
+  const auto& t = log.of(Role::time);
+  const std::vector<double> spacing_s = spacing(t);
+  std::vector<std::size_t> falls;
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (t[i] < t[i - 1]) falls.push_back(i);
+  }
+  if (falls.empty()) return;
+  constexpr double correction_s = 5;  // a clock that is set right by another jumps by less
+  const std::size_t first = falls.front();
+  const std::string what_to_do =
+      *std::min_element(spacing_s.begin(), spacing_s.end()) < -correction_s
+          ? "(two recordings joined, or two clocks); split the file there or give it a session column"
+      : falls.size() > 2
+          ? fmt::format("and in {} places (rows out of order); sort the rows by time", falls.size())
+          : fmt::format(
+                "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
+                "the file there",
+                t[first - 1] - t[first] + median(spacing_s));
+  refuse_data(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
+                          table.line[rows[first]], t[first - 1], t[first], what_to_do));
+}
+
+std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time) {
+  constexpr std::size_t most_late = 5;
+  constexpr double most_share = 0.05;
+  std::size_t moved = 0, latest = 0;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    if (time[rows[i]] >= time[rows[latest]]) {
+      latest = i;
+      continue;
+    }
+    const bool alone = latest + 1 == i;
+    if (!alone || (i > most_late && time[rows[i]] < time[rows[i - most_late - 1]])) return 0;
+    ++moved;
+  }
+  if (static_cast<double>(moved) > most_share * static_cast<double>(rows.size())) return 0;
+  std::stable_sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) { return time[a] < time[b]; });
+  return moved;
+}
+
+void spread_shared_times(Log& log) {
+  std::vector<double>& t = log.of(Role::time);
+  std::vector<std::size_t> first = {0};
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (t[i] != t[i - 1]) first.push_back(i);
+  }
+  if (first.size() < 3 || t.size() < 2 * first.size()) return;
+  const std::vector<double> told_s = t;
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < first.size(); ++k) steps_s.push_back(told_s[first[k]] - told_s[first[k - 1]]);
+  const double step_s = median(steps_s);
+  std::vector<double> rows;
+  for (std::size_t k = 1; k < first.size(); ++k) rows.push_back(static_cast<double>(first[k] - first[k - 1]));
+  const double usual = median(rows);
+  first.push_back(t.size());
+  for (std::size_t k = 0; k + 1 < first.size(); ++k) {
+    // The log may begin and end within a step; what is missing of the first is missing before it.
+    const double count = std::max(usual, static_cast<double>(first[k + 1] - first[k]));
+    const double skipped = k == 0 ? count - static_cast<double>(first[1]) : 0;
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i)
+      t[i] = told_s[i] + step_s * (static_cast<double>(i - first[k]) + skipped) / count;
+  }
+  log.notes.push_back(
+      fmt::format("About {:g} rows share each time; they are spread over the {:g} s to the next.", usual, step_s));
+}
+
+std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, const std::vector<double>& time) {
+  const auto same = [&](std::size_t a, std::size_t b) {
+    return time[a] == time[b] && std::all_of(table.columns.begin(), table.columns.end(), [&](const auto& column) {
+             return column[a] == column[b] || (std::isnan(column[a]) && std::isnan(column[b]));
+           });
+  };
+  const auto end = std::unique(rows.begin(), rows.end(), same);
+  const auto repeated = static_cast<std::size_t>(rows.end() - end);
+  rows.erase(end, rows.end());
+  return repeated;
+}
+
+void pass_midnights(Log& log) {
+  constexpr double day_s = 86400, near_s = 600;
+  double before_s = 0;
+  int midnights = 0;
+  for (double& t : log.of(Role::time)) {
+    midnights += (before_s - t > day_s / 2) - (midnights > 0 && t - before_s > day_s - near_s);
+    before_s = t;
+    t += day_s * midnights;
+  }
+  if (midnights > 0)
+    log.notes.push_back(fmt::format("The clock passes midnight {} time{}; a day is added each time.", midnights,
+                                    midnights == 1 ? "" : "s"));
+}
+
+Source give_clock(Table& table, const std::vector<Session>& sessions, double period_s) {
+  std::vector<double> time_s(table.rows(), missing);
+  for (const auto& [name, rows] : sessions) {
+    for (std::size_t i = 0; i < rows.size(); ++i) time_s[rows[i]] = static_cast<double>(i) * period_s;
+  }
+  table.names.push_back("--period");
+  table.columns.push_back(std::move(time_s));
+  table.words.emplace_back();
+  table.of_day.push_back(false);
+  return {table.names.back()};
+}
+
+}  // namespace identify

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// When each row was written: what clocks tell too coarsely, out of order, from another day or not at all is put right,
+// and what cannot be is refused.
+#pragma once
+
+#include <vector>
+
+#include "identify/log/log.hpp"
+#include "identify/log/rows.hpp"
+
+namespace identify {
+
+/// Sorts rows of which some few, each for itself, stand up to five too late, as of messages that overtook each other;
+/// how many did. A clock that was set back stays so for more than a row.
+std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time);
+
+/// Takes rows away that say again, time and all, what the row before them says; how many.
+std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, const std::vector<double>& time);
+
+/// A column of the time since the first row of a session, of rows that are a period apart.
+Source give_clock(Table& table, const std::vector<Session>& sessions, double period_s);
+
+/// Refuses a clock that counts from 1970 and in no seconds. 1e11 s is in the year 5138.
+void check_epoch(const Log& log, double first_cell);
+
+/// A time of day that falls by half a day or more has passed midnight; one that rises by nearly a day is a row from
+/// before it, out of order.
+void pass_midnights(Log& log);
+
+/// Refuses time that runs backwards, with what to do about it. `rows`: of the table, in the log's order.
+void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows);
+
+/// Times told too coarsely for the rows, in whole seconds most often: rows that share one are spread until the next.
+void spread_shared_times(Log& log);
+
+}  // namespace identify

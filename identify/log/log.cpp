@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+#include "identify/log/log.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "identify/log/clock.hpp"
+#include "identify/log/derived.hpp"
+#include "identify/log/filled.hpp"
+#include "identify/log/impossible.hpp"
+#include "identify/log/masks.hpp"
+#include "identify/log/pauses.hpp"
+#include "identify/log/rows.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+namespace {
+
+using wire::pc::refuse;
+using wire::pc::refuse_data;
+
+/// Columns that are read and checked, and that nothing comes of.
+void note_unused(Log& log) {
+  const auto names = [&](std::initializer_list<Role> roles) {
+    std::vector<std::string> there;
+    for (const Role role : roles) {
+      if (log.has(role)) there.push_back(own_name(role));
+    }
+    return there;
+  };
+  std::vector<std::string> unused =
+      names({Role::phase_a, Role::phase_b, Role::phase_c, Role::torque, Role::bus_V, Role::bus_A, Role::board});
+  if (log.has(Role::winding_ohm) && log.has(Role::core)) unused.push_back(own_name(Role::winding_ohm));
+  if (log.has(Role::power)) {
+    const auto currents = names({Role::current, Role::id, Role::iq});
+    if (!currents.empty()) {
+      log.notes.push_back(fmt::format(
+          "power_W is taken for the heat, and not {}; to fit by the current instead, delete the power's column.",
+          fmt::join(currents, ", ")));
+    }
+  } else if (log.has(Role::id) && !log.has(Role::iq)) {
+    unused.push_back(own_name(Role::id));
+  }
+  if (!unused.empty())
+    log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
+}
+
+Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
+            const std::string& name, const std::optional<wire::Motor>& motor) {
+  Log log;
+  log.name = name;
+  const std::size_t time_column = index_of(table, found.at(Role::time));
+  const auto& time = table.columns[time_column];
+  std::vector<std::size_t> rows;
+  for (const std::size_t r : chosen) {
+    if (!std::isnan(time[r])) rows.push_back(r);
+  }
+  if (rows.size() * 3 < chosen.size() * 2 || rows.empty())
+    refuse_data(fmt::format("{}: {} of {} rows have no time; record the log again.", name, chosen.size() - rows.size(),
+                            chosen.size()));
+  if (rows.size() < chosen.size())
+    log.notes.push_back(fmt::format("{} rows without a time were left out.", chosen.size() - rows.size()));
+  if (const std::size_t moved = put_in_order(rows, time); moved > 0)
+    log.notes.push_back(fmt::format("Rows that were out of order by a few were sorted by time: {}.", moved));
+  if (const std::size_t repeated = drop_repeated(rows, table, time); repeated > 0)
+    log.notes.push_back(fmt::format("Rows that are the same as the row before were left out: {}.", repeated));
+  for (const auto& [role, source] : found) {
+    if (role == Role::session) continue;
+    log.called[static_cast<std::size_t>(role)] = source.column;
+    const auto& from = table.columns[index_of(table, source)];
+    auto& to = log.of(role);
+    to.reserve(rows.size());
+    for (const std::size_t r : rows) to.push_back(source.factor * (from[r] + source.offset));
+    // A sensor that is not connected; 0 degC all along, and not by a hundredth otherwise, is no weather.
+    const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
+                           count_told(to) > 1 && largest_magnitude(to) == 0;
+    if (unplugged) {
+      to.clear();
+      log.notes.push_back(
+          fmt::format("{} is 0 in all rows, as of a sensor that is not connected, and was left out.", own_name(role)));
+    } else if (count_told(to) == 0) {
+      to.clear();
+      log.notes.push_back(
+          fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
+    }
+  }
+  read_phases(log);
+  if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
+    refuse_data(name +
+                ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
+  check_alone(log, found);
+  check_epoch(log, time[rows.front()]);
+  if (table.of_day[time_column]) pass_midnights(log);
+  check_time(table, log, rows);
+  spread_shared_times(log);
+  const double start_s = log.of(Role::time).front();
+  for (double& t : log.of(Role::time)) t -= start_s;
+  read_torque(log, motor);
+  read_resistance(log);
+  note_unused(log);
+  return log;
+}
+
+}  // namespace
+
+std::string column_in(const Log& log, Role role, const std::string& unit) {
+  const std::string& called = log.called[static_cast<std::size_t>(role)];
+  return fmt::format("--column {}={}", own_name(role),
+                     for_a_shell((called.empty() ? own_name(role) : called) + ":" + unit));
+}
+
+bool resumes(const Log& log, double after_s, double until_s) {
+  return std::any_of(log.resumes_s.begin(), log.resumes_s.end(), [&](double s) { return s > after_s && s <= until_s; });
+}
+
+Role heat_of(const Log& log) {
+  for (const Role role : {Role::power, Role::current}) {
+    if (log.has(role)) return role;
+  }
+  return Role::iq;
+}
+
+const char* heat_word(const Log& log) {
+  return log.has(Role::power) ? "power" : log.torque_for_A ? "torque" : "current";
+}
+
+Role sink_of(const Log& log) { return log.has(Role::coolant) ? Role::coolant : Role::ambient; }
+
+double first_degC(const Log& log) {
+  const Role sensor = count_told(log.of(Role::housing)) > 0 ? Role::housing : Role::core;
+  constexpr double hardly = 0.05;  // of the most: a 400th of its heat
+  std::size_t rest = log.of(Role::time).size();
+  for (const Role role : {heat_of(log), Role::speed}) {
+    const double most = hardly * largest_magnitude(log.of(role));
+    for (std::size_t i = 0; i < log.of(role).size(); ++i) {
+      if (std::abs(log.of(role)[i]) > most) rest = std::min(rest, i);
+    }
+  }
+  double sum = 0, n = 0;
+  for (std::size_t i = 0; i < log.of(sensor).size() && (i < rest || n == 0); ++i) {
+    if (!std::isnan(log.of(sensor)[i])) sum += log.of(sensor)[i], n += 1;
+  }
+  return n > 0 ? sum / n : missing;
+}
+
+Log without_last(Log log, double fraction) {
+  const auto& t = log.of(Role::time);
+  const auto end = std::lower_bound(t.begin(), t.end(), (1 - fraction) * t.back());
+  const auto rows = static_cast<std::size_t>(end - t.begin());
+  for (std::vector<double>& column : log.columns) column.resize(std::min(column.size(), rows));
+  return log;
+}
+
+std::vector<double> a_row_sooner(std::vector<double> column) {
+  column.erase(column.begin());
+  column.push_back(column.back());
+  return column;
+}
+
+Log loaded_before(Log log) {
+  for (const Role role : load_roles) {
+    if (log.has(role)) log.of(role) = a_row_sooner(std::move(log.of(role)));
+  }
+  log.loaded_before = true;
+  log.notes.push_back(
+      "Current and speed of a row are taken for those since the row before it: the temperatures ask it.");
+  return log;
+}
+
+std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<wire::Motor>& motor) {
+  std::vector<std::string> unit_notes = table.notes;
+  keep_rows(table, map.rows);
+  auto found = resolve(table, map, unit_notes);
+  const auto has = [&](Role r) { return found.contains(r); };
+  const bool by_row = !std::isnan(map.period_s);
+  if (by_row && has(Role::time))
+    refuse(fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.", table.file,
+                       found.at(Role::time).column));
+  std::vector<std::size_t> known;
+  for (const auto& [role, source] : found) {
+    if (role != Role::session) known.push_back(index_of(table, source));
+  }
+  const auto first_of = [&](std::initializer_list<Role> roles) {
+    return index_of(table, found.at(*std::find_if(roles.begin(), roles.end(), has)));
+  };
+  const std::string several = several_motors(
+      table, first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
+      first_of({Role::housing, Role::core}), known);
+  if (!several.empty()) refuse_data(several);
+  const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
+  const std::vector<Session> sessions = sessions_of(table, session);
+  if (sessions.empty())
+    refuse_data(fmt::format("{}: column '{}' has no value, so no row belongs to a session; fill it or rename it.",
+                            table.file, found.at(Role::session).column));
+  if (by_row) found[Role::time] = give_clock(table, sessions, map.period_s);
+  std::vector<Log> logs;
+  for (const auto& [name, rows] : sessions) {
+    Log whole = one_log(table, found, rows,
+                        name.empty() ? table.file : fmt::format("{} (session {})", table.file, name), motor);
+    if (!std::isnan(map.ambient_degC)) {
+      if (whole.has(sink_of(whole)))
+        whole.notes.push_back(fmt::format(
+            "The log's own {} tells how warm the surroundings are; --ambient is not used.", own_name(sink_of(whole))));
+      else
+        whole.of(Role::ambient).assign(whole.of(Role::time).size(), map.ambient_degC), whole.sink_typed = true;
+    }
+    forget_impossible(whole);
+    forget_filled(whole);
+    forget_glitches(whole);
+    check_values(whole, motor);
+    for (Log& log : parts_between_pauses(std::move(whole))) {
+      mask(log);
+      check_order(log);
+      logs.push_back(std::move(log));
+    }
+  }
+  logs.front().notes.insert(logs.front().notes.begin(), unit_notes.begin(), unit_notes.end());
+  std::size_t in_a_session = 0;
+  for (const Session& s : sessions) in_a_session += s.rows.size();
+  if (in_a_session < table.rows())
+    logs.front().notes.push_back(fmt::format("{} rows without a session were left out.", table.rows() - in_a_session));
+  return logs;
+}
+
+}  // namespace identify
