@@ -224,7 +224,8 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                           {Role::current, {"current", "curr", "strom", "amp"}},
                           {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
                           {Role::torque, {"torque", "effort", "drehmoment"}},
-                          {Role::power, {"loss", "p_loss", "verlust"}}}},
+                          {Role::power, {"loss", "p_loss", "verlust"}},
+                          {Role::power, {"power", "watt", "leistung"}}}},
                         {{Role::housing, Role::core},
                          "a measured temperature (housing_degC or core_degC)",
                          "map it with --column {}",
@@ -239,6 +240,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
     const std::string likely = likely_column(table, found, need.likely);
     hints.push_back(
         fmt::format(fmt::runtime(need.hint), likely.empty() ? own_name(need.likely.front().role) + "=NAME" : likely));
+    if (likely.starts_with(own_name(Role::power))) hints.back() += " if that is what heats the winding";
   }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);

@@ -650,6 +650,8 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
   says(complaint("time_s,i_a,i_b,temp\n0,1,1,20\n1,2,2,21\n"), "--column phase_a_A=i_a");
   says(complaint("time,motor_rms_current,temp\n0,1,20\n1,2,21\n"), "--column current_A=motor_rms_current:1.2247A");
   says(complaint("Date,Time,P_loss,temp\n1/2/2026,1:00 PM,1,20\n"), "--column power_W=P_loss");
+  says(complaint("time_s,Power (W),Stator Body (\u00b0C)\n0,1,20\n"),
+       "--column power_W=\"Power (W)\" if that is what heats the winding");
 }
 
 TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
