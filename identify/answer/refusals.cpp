@@ -316,8 +316,9 @@ Problem under(const Problem& problem, std::vector<Log> logs,
   return unseen_by(problem, logs);
 }
 
-/// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it.
-double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs) {
+/// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it. Steps
+/// that come each at a moment of their own move it as no cause does: by no more than the best set leaves, `left_K`.
+double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs, double left_K) {
   const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
                 sooner = under(problem, logs, told_sooner);
   std::vector<Problem> drawn;  // pairs: one may end where it began by chance
@@ -348,7 +349,8 @@ double left_open_K(const Problem& problem, const Fit& baseline, const std::vecto
   }
   // A load that steps somewhere between two rows, evenly likely, is off by the interval over sqrt(12): all steps alike,
   // or each for itself, where their heat no longer adds up. Drawn was one end or the other, half the interval off.
-  return std::sqrt((moved2 / 12 + drawn2 / 3 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
+  const double each2 = std::min(drawn2 / 3, left_K * left_K * bins);
+  return std::sqrt((moved2 / 12 + each2 + less2 - less_rise * less_rise / std::max(rise2, 1e-9)) / bins);
 }
 
 /// Does the load alternate faster than rows are written, so that each is a draw? From one row to the next but one a
@@ -519,14 +521,14 @@ std::string clipped(const Found& found, const std::vector<Log>& logs) {
 std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   if (found.verdict == Verdict::adequate) return "";
   const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
-  double open_K = left_open_K(problem, baseline, logs);
+  const double left_K = disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K;
+  double open_K = left_open_K(problem, baseline, logs, left_K);
   if (alternates_between_rows(logs))
     open_K = std::max(open_K, 0.5 * apart_K(under(problem, logs, told_at_crests), baseline,
                                             under(problem, logs, told_in_troughs), baseline));
   // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
   const bool unknown = found.verdict == Verdict::unknown_cause;
-  const double asked_K = unknown ? disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K
-                                 : apart_K(problem, baseline, problem, chosen);
+  const double asked_K = unknown ? left_K : apart_K(problem, baseline, problem, chosen);
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
   // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
   constexpr double times = 2.5, worth_K = 0.02;

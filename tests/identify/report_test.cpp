@@ -456,6 +456,29 @@ TEST(SlowReport, LoadsThatBeginBetweenRowsAreNoCause) {
   }
 }
 
+TEST(SlowReport, LoadsThatBeginWithTheRowsHideNoCause) {
+  for (const std::uint64_t seed : {1, 2}) {
+    tests::BenchOptions options;
+    options.seconds = 1200;
+    options.seed = seed;
+    double until_s = 0, hold_A = 0;
+    options.current_A = [&](double t, std::mt19937_64& random) {  // pulses that 0.1 s matters to
+      std::uniform_real_distribution<double> uniform;
+      if (t >= until_s) {
+        hold_A = hold_A > 0 ? 0 : 5 + 5 * uniform(random);
+        until_s = t + (hold_A > 0 ? 0.5 + uniform(random) : 5 + 15 * uniform(random));
+      }
+      return hold_A;
+    };
+    options.extra_housing_W = [&](double t, double, double housing_degC) {  // a draught in the second half
+      return t < 600 ? 0.0 : -0.002 * (housing_degC - options.ambient_degC);
+    };
+    const identify::Report report = identify::discover(tests::bench_logs({options}), tests::ec_16());
+    ASSERT_EQ(report.verdict, Verdict::explained) << report.sentence;
+    EXPECT_EQ(report.causes[0].id, "cooling_change") << seed;
+  }
+}
+
 TEST(SlowReport, WhatIsMissedBesideCausesIsOfTheirNearestFitToo) {
   tests::BenchOptions options;
   options.seconds = 1200;
