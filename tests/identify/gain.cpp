@@ -44,11 +44,11 @@ struct Case {
   Known R1, C1;  // of the model found
 };
 
-/// Impulse of the push and how far the true winding passes its limit.
+/// Impulse of the push and how far the true winding passes its limit; without a `model` the board has its sheet.
 Trace push(const HiddenMotor& motor, Limiter limiter, const std::string& model) {
   Scene scene = read_scene("get-up", root + "/host-sim/scenes", {});
   scene.limiters = {limiter};
-  scene.trust = "identified";
+  scene.trust = model.empty() ? "sheet" : "identified";
   scene.model = model;
   const RunOptions options{.motor_folder = root + "/boards/motors", .plant_motor = motor.motor, .hidden = motor.hidden};
   return run_scene(scene, options).traces.at(0);
@@ -70,7 +70,7 @@ Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::st
   const double limit_degC = sheet.motor.winding_max_degC;
   const double best_As = push(motor, Limiter::oracle, "").impulse_As;
   const auto outcome = [&](const std::string& model) {
-    const Trace trace = push(motor, Limiter::governor, model);
+    const Trace trace = push(motor, Limiter::governor, report.no_model.empty() ? model : "");
     return Push{std::max(0.0, trace.hottest_true_degC - limit_degC), trace.impulse_As / best_As};
   };
   const auto& found = report.extended.empty() ? report.baseline : report.extended;
