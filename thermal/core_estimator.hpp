@@ -75,6 +75,7 @@ struct HeatMemory {
   float degC[max_nodes], sigma_K[max_nodes];
   float ambient_degC;
   std::uint32_t disbelieved = 0;  // 1: the housing sensor was, and is until it agrees again
+  float late_K = 0.0f;            // how much less a sensor may read that lags untold, per sigma of that
 };
 
 class CoreEstimator {
@@ -105,7 +106,8 @@ class CoreEstimator {
   /// nothing known, see start_hot.
   void restore(const HeatMemory& memory, double off_s);
   /// After a reset of which nothing is known: every node 10 K below the winding's limit, and that with the margin on
-  /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise.
+  /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise. After either of both a cold
+  /// reading may come from a sensor that lags, and lowers as much as it cannot.
   void start_hot();
 
   const Estimate& estimate() const { return estimate_; }
@@ -130,7 +132,8 @@ class CoreEstimator {
   void step();
   void propagate_covariance(const HeatNetwork<double>::Rates& rates);
   void hear_housing(Reading housing);
-  void correct_by_housing(float reading_degC, float innovation_K);
+  void correct_by_housing(float reading_degC, float innovation_K, bool first);
+  void meet_sensor(float reading_degC);
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
@@ -166,6 +169,7 @@ class CoreEstimator {
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;
   int window_ = 0, silent_ = 0, unheard_ = 0;  // steps: of readings in it, without one, since it was last full
   bool acquired_ = false, read_ = false, ambient_known_ = false;
+  bool resumed_ = false;               // after a reset: the sensor may lag behind what was remembered
   double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
   float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
   float hotter_K_ = 0.0f;              // what the next reading that is too hot counts for
