@@ -113,12 +113,12 @@ void CoreEstimator::widen_all() {
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
                                     int lost_steps) {
   flags_ &= ~(input_replaced | lost_time | state_restored);
+  if (!take_input(input)) flags_ |= input_replaced;
   if (lost_steps > 0) {
     flags_ |= lost_time;
     for (int i = 0; i < lost_steps && i < most_lost_steps; ++i) step();
     if (lost_steps > most_lost_steps) raise_to(static_cast<float>(hottest_limit_degC()) - unknown_below_K);
   }
-  if (!take_input(input)) flags_ |= input_replaced;
   ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
                    measured_ambient.value < hottest_reading_degC;
   if (ambient_known_) ambient_degC_ = static_cast<double>(measured_ambient.value);

@@ -86,8 +86,8 @@ class CoreEstimator {
   /// housing reading moves all of it. After a reset call restore() instead of trusting that.
   CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings);
 
-  /// One step of 10 ms. `lost_steps` are charged before it at the last input. After more than 200 of them nothing is
-  /// known of a winding: it is 10 K below its limit, or hotter.
+  /// One step of 10 ms, and `lost_steps` more of them that passed since the last call: the input is the mean over all.
+  /// After more than 200 lost ones nothing is known of a winding: it is 10 K below its limit, or hotter.
   /// input[Boundary::ambient] is not used: give `ambient` when it is measured.
   const Estimate& tick(const HeatInput<>& input, Reading housing, Reading ambient = {0.0f, false}, int lost_steps = 0);
 

@@ -454,15 +454,11 @@ TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
   }
 }
 
-TEST(Estimator, LostTimeIsChargedAtTheLastInput) {
+TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
   CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
-  for (int i = 0; i < 10; ++i) {
-    whole.tick(current(100), missing), gap.tick(current(100), missing), idle_gap.tick(current(100), missing);
-  }
-  for (int i = 0; i < 6; ++i) whole.tick(current(100), missing);
-  whole.tick(current(0), missing);
-  EXPECT_TRUE(gap.tick(current(0), missing, missing, 6).flags & thermal::lost_time);
-  idle_gap.tick(current(0), missing);
+  for (int i = 0; i < 7; ++i) whole.tick(current(100), missing);
+  EXPECT_TRUE(gap.tick(current(100), missing, missing, 6).flags & thermal::lost_time);
+  idle_gap.tick(current(100), missing);
   EXPECT_NEAR(gap.estimate().hottest_degC(), whole.estimate().hottest_degC(), 1e-9);
   EXPECT_GT(gap.estimate().hottest_degC(), idle_gap.estimate().hottest_degC() + 2);
 }
