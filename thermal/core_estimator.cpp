@@ -16,11 +16,12 @@ constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
 // A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
 constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
 
-constexpr int window_steps = 50;        // the housing is heard twice a second: faster only averages its noise
-constexpr int missing_steps = 10;       // 100 ms without a reading: safety table, NTC open or short
-constexpr int slow_window_steps = 200;  // a sensor that needs longer to fill a window is no better than none: chosen
-constexpr int most_lost_steps = 200;    // 2 s: no watchdog waits longer
-constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
+constexpr int window_steps = 50;           // the housing is heard twice a second: faster only averages its noise
+constexpr int missing_steps = 10;          // 100 ms without a reading: safety table, NTC open or short
+constexpr int slow_window_steps = 200;     // a sensor that needs longer to fill a window is no better than none: chosen
+constexpr int most_lost_steps = 200;       // 2 s: no watchdog waits longer
+constexpr float most_follow = 1.4f;        // K of a winding by which copper follows a kelvin of its housing
+constexpr float most_pull_K = 3.5f;        // safety table: never lowered by more than 5 K, over most_follow
 constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
 constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
 constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
@@ -364,6 +365,11 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   if (std::isfinite(most_down_K)) {
     const float pulled_K = pulled_K_ + down_by(gain, innovation_K);  // net: noise up and down cancels
     pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
+  }
+  // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
+  // less heat. So a winding falls no further than it would follow.
+  if (seen[sensor()] != 0.0f && innovation_K < 0.0f) {
+    for (int i = 0; i < n_; ++i) gain[i] = std::fmin(gain[i], most_follow * std::fmax(gain[housing_.node], 0.0f));
   }
 
   settle(due_steps_);

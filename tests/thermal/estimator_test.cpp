@@ -359,6 +359,25 @@ TEST(Estimator, ASensorThatLagsUntoldLetsNoWindingPassItsLimit) {
   }
 }
 
+TEST(Estimator, AMotorThatIsCooledBetterNeverReadsCold) {
+  const wire::Motor flat = reference::motor(0.5, 4.3, 3.1, 28.8, 157);
+  wire::Motor on_a_cold_plate = flat;
+  on_a_cold_plate.R2_K_per_W *= 0.3;
+  for (const auto& [real, ambient_degC] :
+       {std::pair{flat, -20.0}, std::pair{flat, 0.0}, std::pair{on_a_cold_plate, 20.0}}) {
+    Bench b(real, with(thermal::sheet_trust), ambient_degC, flat);
+    thermal::Governor governor({});
+    double allowed_A = 0, hottest_degC = 0;
+    for (int i = 0; i < 120000; ++i) {
+      b.run(0.01, i % 60000 < 30000 ? allowed_A * allowed_A : 0.0);
+      allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+      hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+    }
+    EXPECT_LE(hottest_degC, 155) << ambient_degC;
+    EXPECT_GT(hottest_degC, 110) << "the limit was never near, so nothing was shown";
+  }
+}
+
 struct LaggingSensor {
   double lag_s, told_s;
   thermal::Trust trust;
