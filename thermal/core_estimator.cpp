@@ -16,11 +16,12 @@ constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
 // A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
 constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
 
-constexpr int window_steps = 50;        // the housing is heard twice a second: faster only averages its noise
-constexpr int missing_steps = 10;       // 100 ms without a reading: safety table, NTC open or short
-constexpr int slow_window_steps = 200;  // a sensor that needs longer to fill a window is no better than none: chosen
-constexpr int most_lost_steps = 200;    // 2 s: no watchdog waits longer
-constexpr float most_pull_K = 3.5f;  // safety table: never lowered by more than 5 K; hot copper multiplies by up to 1.4
+constexpr int window_steps = 50;           // the housing is heard twice a second: faster only averages its noise
+constexpr int missing_steps = 10;          // 100 ms without a reading: safety table, NTC open or short
+constexpr int slow_window_steps = 200;     // a sensor that needs longer to fill a window is no better than none: chosen
+constexpr int most_lost_steps = 200;       // 2 s: no watchdog waits longer
+constexpr float most_follow = 1.4f;        // K of a winding by which copper follows a kelvin of its housing
+constexpr float most_pull_K = 3.5f;        // safety table: never lowered by more than 5 K, over most_follow
 constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
 constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
 constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
@@ -32,6 +33,7 @@ constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached 
 constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
+constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
 constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
@@ -112,12 +114,12 @@ void CoreEstimator::widen_all() {
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
                                     int lost_steps) {
   flags_ &= ~(input_replaced | lost_time | state_restored);
+  if (!take_input(input)) flags_ |= input_replaced;
   if (lost_steps > 0) {
     flags_ |= lost_time;
     for (int i = 0; i < lost_steps && i < most_lost_steps; ++i) step();
     if (lost_steps > most_lost_steps) raise_to(static_cast<float>(hottest_limit_degC()) - unknown_below_K);
   }
-  if (!take_input(input)) flags_ |= input_replaced;
   ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
                    measured_ambient.value < hottest_reading_degC;
   if (ambient_known_) ambient_degC_ = static_cast<double>(measured_ambient.value);
@@ -237,7 +239,8 @@ void CoreEstimator::hear_housing(Reading housing) {
   if (unheard_ < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
   window_ = unheard_ = 0;
   reading_sum_ = sensor_sum_ = 0.0;
-  if (!read_) reading_slow_degC_ = reading_degC;
+  const bool first = !read_;
+  if (first) reading_slow_degC_ = reading_degC;
   read_ = true;
   if (!acquired_) {
     // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
@@ -247,20 +250,35 @@ void CoreEstimator::hear_housing(Reading housing) {
   }
   reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
   reading_moved_K_ = reading_degC - reading_slow_degC_;
-  correct_by_housing(reading_degC, innovation_K);
+  correct_by_housing(reading_degC, innovation_K, first);
 }
 
-void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K) {
+/// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
+void CoreEstimator::meet_sensor(float reading_degC) {
+  sensor_degC_ = static_cast<double>(reading_degC);
+  last_sensor_degC_ = reading_degC;
+  p_.row(sensor()).setZero();
+  p_.col(sensor()).setZero();
+  late_shared_K_[sensor()] = 0.0f;
+  late_K_ = 0.0;
+  p_(sensor(), sensor()) = squared(settings_.housing_noise_K);
+  raise_to(reading_degC);
+}
+
+void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
   Row seen = Row::Zero(n_ + 5);
   seen[sensor()] = 1.0f;
   const float noise = squared(settings_.housing_noise_K);
+  const float late_K = static_cast<float>(late_K_);
+  if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
   if (!acquired_) {
-    acquired_ = correct(seen, innovation_K, noise, 0.0f, std::numeric_limits<float>::infinity(), 1);
+    if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
+    const int h = housing_.node;
+    acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K);
     trusted_ambient_degC_ = ambient_degC_;
-    if (acquired_) raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
+    raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
     return;
   }
-  const float late_K = static_cast<float>(late_K_);
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
   const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
   // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
@@ -301,12 +319,13 @@ void CoreEstimator::disbelieve_housing() {
   flags_ |= housing_contradicts;
 }
 
-/// How far a correction lowers the winding, K; negative if it raises all of them.
+/// How far a correction lowers the winding, K; negative if it raises all of them. What the housing falls the windings
+/// will, even those that it shares no error with.
 float CoreEstimator::down_by(const Row& gain, float innovation_K) const {
   float down_K = -std::numeric_limits<float>::infinity();
   for (int i = 0; i < n_; ++i) {
     const float fall_K = -gain[i] * innovation_K;
-    if (std::isfinite(max_degC_[i]) && fall_K > down_K) down_K = fall_K;
+    if ((std::isfinite(max_degC_[i]) || i == housing_.node) && fall_K > down_K) down_K = fall_K;
   }
   return down_K;
 }
@@ -346,6 +365,11 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   if (std::isfinite(most_down_K)) {
     const float pulled_K = pulled_K_ + down_by(gain, innovation_K);  // net: noise up and down cancels
     pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
+  }
+  // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
+  // less heat. So a winding falls no further than it would follow.
+  if (seen[sensor()] != 0.0f && innovation_K < 0.0f) {
+    for (int i = 0; i < n_; ++i) gain[i] = std::fmin(gain[i], most_follow * std::fmax(gain[housing_.node], 0.0f));
   }
 
   settle(due_steps_);
@@ -405,7 +429,12 @@ void CoreEstimator::raise_to(float winding_degC) {
 }
 
 HeatMemory CoreEstimator::save() const {
-  HeatMemory memory{n_, {}, {}, static_cast<float>(ambient_degC_), flags_ & housing_contradicts ? 1u : 0u};
+  HeatMemory memory{n_,
+                    {},
+                    {},
+                    static_cast<float>(ambient_degC_),
+                    flags_ & housing_contradicts ? 1u : 0u,
+                    late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
   for (int i = 0; i < n_; ++i) {
     memory.degC[i] = static_cast<float>(degC_[i]);
     memory.sigma_K[i] = estimate_.sigma_K[i];
@@ -440,12 +469,15 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   bool soaked = true;
   for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
+  if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K) late_K_ = static_cast<double>(memory.late_K);
   if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
   if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
     flags_ |= housing_contradicts;
     acquired_ = true;
     trusted_ambient_degC_ = ambient_degC_;
+    const int h = housing_.node;
+    p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K[h]);
   }
   publish();
 }
@@ -477,11 +509,12 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   acquired_ = read_ = false;
+  resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
   due_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
-  late_K_ = 0.0;
+  late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
   for (int i = 0; i < n_; ++i) {

@@ -75,6 +75,7 @@ struct HeatMemory {
   float degC[max_nodes], sigma_K[max_nodes];
   float ambient_degC;
   std::uint32_t disbelieved = 0;  // 1: the housing sensor was, and is until it agrees again
+  float late_K = 0.0f;            // how much less a sensor may read that lags untold, per sigma of that
 };
 
 class CoreEstimator {
@@ -85,8 +86,8 @@ class CoreEstimator {
   /// housing reading moves all of it. After a reset call restore() instead of trusting that.
   CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings);
 
-  /// One step of 10 ms. `lost_steps` are charged before it at the last input. After more than 200 of them nothing is
-  /// known of a winding: it is 10 K below its limit, or hotter.
+  /// One step of 10 ms, and `lost_steps` more of them that passed since the last call: the input is the mean over all.
+  /// After more than 200 lost ones nothing is known of a winding: it is 10 K below its limit, or hotter.
   /// input[Boundary::ambient] is not used: give `ambient` when it is measured.
   const Estimate& tick(const HeatInput<>& input, Reading housing, Reading ambient = {0.0f, false}, int lost_steps = 0);
 
@@ -105,7 +106,8 @@ class CoreEstimator {
   /// nothing known, see start_hot.
   void restore(const HeatMemory& memory, double off_s);
   /// After a reset of which nothing is known: every node 10 K below the winding's limit, and that with the margin on
-  /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise.
+  /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise. After either of both a cold
+  /// reading may come from a sensor that lags, and lowers as much as it cannot.
   void start_hot();
 
   const Estimate& estimate() const { return estimate_; }
@@ -130,7 +132,8 @@ class CoreEstimator {
   void step();
   void propagate_covariance(const HeatNetwork<double>::Rates& rates);
   void hear_housing(Reading housing);
-  void correct_by_housing(float reading_degC, float innovation_K);
+  void correct_by_housing(float reading_degC, float innovation_K, bool first);
+  void meet_sensor(float reading_degC);
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
@@ -166,6 +169,7 @@ class CoreEstimator {
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;
   int window_ = 0, silent_ = 0, unheard_ = 0;  // steps: of readings in it, without one, since it was last full
   bool acquired_ = false, read_ = false, ambient_known_ = false;
+  bool resumed_ = false;               // after a reset: the sensor may lag behind what was remembered
   double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
   float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
   float hotter_K_ = 0.0f;              // what the next reading that is too hot counts for

@@ -32,7 +32,7 @@ class HeatKeeper {
   Recalled recall(firmware::DriverMemory& memory);
   /// Every 10 ms, from the slow lane.
   void keep(const firmware::DriverMemory& now);
-  /// When the supply falls: 49 words, 0.8 ms (at worst 4.9). `watched`: the window watchdog runs. ISR, with open
+  /// When the supply falls: 51 words, 0.8 ms (at worst 5.1). `watched`: the window watchdog runs. ISR, with open
   /// bridges.
   void last_words(bool watched);
 

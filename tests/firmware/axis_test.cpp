@@ -703,6 +703,26 @@ TEST(Axis, ASlowLaneThatIsLateLosesNoTime) {
   }
 }
 
+/// 4 s of a slow lane that is late by 20 ms each other time, when a current flows; on time: the same current.
+double rise_of_bursts_K(bool on_time) {
+  firmware::Driver driver(bench::driver_setup());
+  std::uint32_t sequence = bench::bring_up(driver.axis(0));
+  driver.axis(0).disarm();
+  for (int i = 0; i < 80000; ++i) {
+    hal::AxisSample sample = bench::quiet_sample(sequence++);
+    const int in_cycle = i % 800;
+    if (in_cycle >= 200) sample.current_A = {20, -10, -10};
+    (void)driver.axis(0).tick(sample);
+    if (on_time ? in_cycle % 200 == 199 : in_cycle == 199 || in_cycle == 799)
+      driver.slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  }
+  return driver.axis(0).core().estimate().hottest_degC() - 25;
+}
+
+TEST(Axis, ASlowLaneThatIsLateWhileItGetsHotLosesNoHeat) {
+  EXPECT_GT(rise_of_bursts_K(false), 0.98 * rise_of_bursts_K(true));
+}
+
 TEST(Axis, WhatFlowsThroughTheDiodesBesideARefusedSampleHeats) {
   hal::AxisSample flowing = bench::quiet_sample(0);
   flowing.current_A = {5, -2.5f, -2.5f};

@@ -62,6 +62,7 @@ TEST(Memory, EachValueThatIsNoTemperatureCountsAsTheLimit) {
       EXPECT_GE(driver.axis(0).core().estimate().degC[node], 154.9) << "node " << node;
       memory = hot_memory();
       memory.axes[0].heat.sigma_K[node] = memory.axes[0].heat.ambient_degC = memory.board_used_ratio = bad;
+      memory.axes[0].heat.late_K = bad;
       Driver other(bench::driver_setup());
       other.restore(memory);
       EXPECT_GE(hottest(other, 0), 139.9);

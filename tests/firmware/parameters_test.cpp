@@ -5,6 +5,7 @@
 #include <string>
 
 #include "firmware/axis_parameters.hpp"
+#include "firmware/heat_parameters.hpp"
 #include "tests/firmware/bench.hpp"
 
 namespace {
@@ -52,6 +53,17 @@ TEST(Parameters, WhatIsOutOfRangeIsNamed) {
       EXPECT_FALSE(found.missing);
     }
   }
+}
+
+TEST(Parameters, AWindingThatIsTooFastForTheSlowLaneIsRefused) {
+  const firmware::HeatParameters good = firmware::heat_parameters_from(bench::motor(), thermal::sheet_trust);
+  EXPECT_EQ(validate(good).id, 0);
+  firmware::HeatParameters fast = good;
+  fast.C1_J_per_K = 0.45f / good.R1_K_per_W;
+  EXPECT_EQ(validate(fast).id, 0x0203);
+  fast = good;
+  fast.phase_coupling_W_per_K = 100.0f;
+  EXPECT_EQ(validate(fast).id, 0x0207);
 }
 
 TEST(Parameters, ContradictionsAreFound) {

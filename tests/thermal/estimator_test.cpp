@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 
 #include "tests/thermal/reference.hpp"
@@ -358,6 +359,88 @@ TEST(Estimator, ASensorThatLagsUntoldLetsNoWindingPassItsLimit) {
   }
 }
 
+TEST(Estimator, AMotorThatIsCooledBetterNeverReadsCold) {
+  const wire::Motor flat = reference::motor(0.5, 4.3, 3.1, 28.8, 157);
+  wire::Motor on_a_cold_plate = flat;
+  on_a_cold_plate.R2_K_per_W *= 0.3;
+  for (const auto& [real, ambient_degC] :
+       {std::pair{flat, -20.0}, std::pair{flat, 0.0}, std::pair{on_a_cold_plate, 20.0}}) {
+    Bench b(real, with(thermal::sheet_trust), ambient_degC, flat);
+    thermal::Governor governor({});
+    double allowed_A = 0, hottest_degC = 0;
+    for (int i = 0; i < 120000; ++i) {
+      b.run(0.01, i % 60000 < 30000 ? allowed_A * allowed_A : 0.0);
+      allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+      hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+    }
+    EXPECT_LE(hottest_degC, 155) << ambient_degC;
+    EXPECT_GT(hottest_degC, 110) << "the limit was never near, so nothing was shown";
+  }
+}
+
+struct LaggingSensor {
+  double lag_s, told_s;
+  thermal::Trust trust;
+};
+
+/// A push to the limit and on, with a reset in it of which nobody knows how long it took; the hottest winding after it.
+/// `remembered` false: the memory is lost as well.
+double hottest_after_a_reset_degC(const wire::Motor& m, float most_A, const LaggingSensor& sensor, double push_s,
+                                  double rest_s, bool remembered) {
+  Bench b(m, with(sensor.trust), 25);
+  auto set = thermal::three_phase_set(m);
+  set.housing.lag_s = sensor.told_s;
+  thermal::GovernorSettings settings;
+  settings.max_A = most_A;
+  std::optional<CoreEstimator> core;
+  std::optional<thermal::Governor> governor;
+  const auto boot = [&] { core.emplace(set, with(sensor.trust)), governor.emplace(settings); };
+  double sensed_degC = 25, hottest_degC = 0;
+  const auto run = [&](double seconds, double most) {
+    double allowed_A = 0;
+    for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
+      const double i_A = std::min(most, allowed_A);
+      b.plant.advance(0.01L, 1, static_cast<reference::Real>(i_A * i_A), 25);
+      sensed_degC += (static_cast<double>(b.honest().value) - sensed_degC) * (1 - std::exp(-0.01 / sensor.lag_s));
+      core->tick(current(i_A * i_A), {static_cast<float>(sensed_degC), true});
+      allowed_A = static_cast<double>(governor->tick(*core).current_A);
+      hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+    }
+  };
+  boot();
+  run(1, 0);
+  run(push_s, static_cast<double>(most_A));
+  run(rest_s, 0);
+  const thermal::HeatMemory memory = core->save();
+  boot();
+  remembered ? core->restore(memory, -1) : core->start_hot();
+  hottest_degC = 0;
+  run(0.5, 0);
+  run(30, static_cast<double>(most_A));
+  return hottest_degC;
+}
+
+TEST(SlowEstimator, AResetDoesNotMakeASensorThatLagsPullAWindingOverItsLimit) {
+  const LaggingSensor sensors[] = {{5, 5, thermal::exact_trust},        {20, 20, thermal::exact_trust},
+                                   {60, 60, thermal::exact_trust},      {20, 20, thermal::identified_trust},
+                                   {60, 60, thermal::identified_trust}, {60, 60, thermal::sheet_trust},
+                                   {20, 0, thermal::sheet_trust},       {60, 0, thermal::sheet_trust}};
+  for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+    for (const LaggingSensor& sensor : sensors) {
+      double hottest_degC = 0;
+      for (const double push_s : {3.0, 6.0, 20.0, 40.0}) {
+        for (const double rest_s : {0.0, 3.0}) {
+          for (const bool remembered : {true, false})
+            hottest_degC =
+                std::max(hottest_degC, hottest_after_a_reset_degC(m, most_A, sensor, push_s, rest_s, remembered));
+        }
+      }
+      EXPECT_LE(hottest_degC, 155 + 3) << sensor.lag_s << " s, told " << sensor.told_s << ", R1 " << m.R1_K_per_W;
+      EXPECT_GT(hottest_degC, 125) << "the limit was never near, so nothing was shown";
+    }
+  }
+}
+
 TEST(Estimator, AHotReadingAlwaysRaises) {
   Bench bench(reference::ec16(), with(thermal::identified_trust), 25);
   bench.run(60, 2);
@@ -390,15 +473,11 @@ TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
   }
 }
 
-TEST(Estimator, LostTimeIsChargedAtTheLastInput) {
+TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
   CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
-  for (int i = 0; i < 10; ++i) {
-    whole.tick(current(100), missing), gap.tick(current(100), missing), idle_gap.tick(current(100), missing);
-  }
-  for (int i = 0; i < 6; ++i) whole.tick(current(100), missing);
-  whole.tick(current(0), missing);
-  EXPECT_TRUE(gap.tick(current(0), missing, missing, 6).flags & thermal::lost_time);
-  idle_gap.tick(current(0), missing);
+  for (int i = 0; i < 7; ++i) whole.tick(current(100), missing);
+  EXPECT_TRUE(gap.tick(current(100), missing, missing, 6).flags & thermal::lost_time);
+  idle_gap.tick(current(100), missing);
   EXPECT_NEAR(gap.estimate().hottest_degC(), whole.estimate().hottest_degC(), 1e-9);
   EXPECT_GT(gap.estimate().hottest_degC(), idle_gap.estimate().hottest_degC() + 2);
 }
@@ -492,6 +571,21 @@ TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAReset) {
     for (int i = 0; i < 200; ++i) again.tick(current(8), {static_cast<float>(again.estimate().housing_degC), true});
     EXPECT_FALSE(again.estimate().flags & thermal::housing_contradicts) << "until it agrees again";
   }
+}
+
+TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAResetForBeingLessWrong) {
+  Bench b(reference::ec16(), with(thermal::identified_trust), 25);
+  b.run(60, 1);
+  b.run(120, 8, [&] { return Reading{b.honest().value - 20, true}; });
+  ASSERT_TRUE(b.flag(thermal::housing_contradicts));
+  CoreEstimator again(thermal::three_phase_set(b.m), with(thermal::identified_trust));
+  again.restore(b.core.save(), -1);
+  const double before_degC = again.estimate().housing_degC;
+  for (int i = 0; i < 100; ++i) {
+    again.tick(current(8), {b.honest().value - 20, true});
+    ASSERT_TRUE(again.estimate().flags & thermal::housing_contradicts);
+  }
+  EXPECT_GE(again.estimate().housing_degC, before_degC);
 }
 
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {

@@ -290,6 +290,56 @@ TEST(Governor, CreepingRotationStaysBelowThreeKelvin) {
   }
 }
 
+/// A motor as there may be one: time constants and resistances over two decades and more, each phase slow enough for
+/// the slow lane (firmware/heat_parameters.cpp).
+wire::Motor any_motor(std::mt19937& random) {
+  const auto between = [&](double a, double b) {
+    return std::exp(std::uniform_real_distribution<double>(std::log(a), std::log(b))(random));
+  };
+  const double R1 = between(0.01, 30), R2 = between(0.05, 100), winding_s = between(0.5, 30);
+  wire::Motor m = reference::motor(1.0, R1, R2, winding_s, winding_s * between(8, 1000));
+  m.winding_max_degC = std::uniform_real_distribution<double>(80, 200)(random);
+  m.phase_resistance_ohm = between(0.5, 100) * 130 / (R1 + R2) / 600;  // 20 A make up to 100 times what it can stand
+  const double fastest = (m.C1_J_per_K / 3 / 0.05 - 1 / (3 * R1)) / 2;
+  m.phase_coupling_W_per_K = random() % 2 == 0 ? 0.0 : std::min(between(0.01, 3) / R1, fastest);
+  return m;
+}
+
+TEST(Governor, NoDemandAndNoTurningOfAnyMotorPassesItsLimit) {
+  double worst_K = -1e9;
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> share(0, 1);
+    Loop loop(any_motor(random), 20, 25);
+    double demand_A = 20, angle_rad = 0, turning_rad_per_s = 0;
+    int until = 0;
+    for (int i = 0; i < 1500; ++i) {
+      if (i >= until) {
+        until = i + static_cast<int>(std::exp(5.7 * share(random)));
+        switch (random() % 4) {
+          case 0:
+            angle_rad = 6.283185307179586 * share(random), turning_rad_per_s = 0;
+            break;
+          case 1:
+            turning_rad_per_s = 0.01 * std::exp(10 * share(random));
+            break;
+          case 2:
+            demand_A = random() % 2 == 0 ? 20 : 20 * share(random);
+            break;
+          default:
+            angle_rad += 1.5707963267948966, turning_rad_per_s = 0;  // the current moves to the other axis
+        }
+      }
+      loop.step(demand_A, angle_rad, turning_rad_per_s > 30);
+      angle_rad += turning_rad_per_s * 0.01;
+    }
+    worst_K = std::max(worst_K, loop.hottest_degC - loop.m.winding_max_degC);
+    EXPECT_LE(loop.hottest_degC, loop.m.winding_max_degC + 3) << "seed " << seed;
+  }
+  std::printf("  300 motors, demands and turnings at random: worst overshoot %.2f K\n", worst_K);
+  EXPECT_GT(worst_K, -1) << "the limit was never near, so nothing was shown";
+}
+
 TEST(Governor, SensorNoiseMakesNoChatter) {
   Loop loop(reference::ec16(), 20, 25);
   std::mt19937 seed(7);
