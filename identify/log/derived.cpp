@@ -68,7 +68,7 @@ int give_sign(std::vector<double>& cells) {
     return 0;
   for (const int bits : {16, 32}) {
     const double all = std::exp2(bits);
-    if (most >= all || most <= 0.75 * all) continue;
+    if (most >= all || most < all - all / 256) continue;  // what has a sign passes zero; 52000 rpm may be what it says
     const auto count = [&](double from, double to) {
       return std::count_if(cells.begin(), cells.end(), [&](double x) { return x >= from * all && x < to * all; });
     };
