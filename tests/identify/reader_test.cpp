@@ -258,9 +258,10 @@ TEST(Reader, NegativeNumbersThatLostTheirSignHaveItAgain) {
   says(log.notes.at(0), "Column 'present_current' shows negative numbers without their sign, 65535 for -1; read so.");
   EXPECT_EQ(current({"0", "4294967196", "4294967295"}).of(Role::current), (std::vector<double>{0, -1, -0.01}));
   const auto large = [&](const std::vector<const char*>& cells) { return current(cells).of(Role::current)[1]; };
-  EXPECT_EQ(large({"0", "65530", "40000", "50000"}), 655.3) << "numbers between: these are large";
-  EXPECT_EQ(large({"0", "60000", "52000", "0"}), 600) << "and so are these, though none is between: none is near zero";
-  EXPECT_EQ(large({"0", "65535.5", "3", "4"}), 655.355) << "no register";
+  EXPECT_DOUBLE_EQ(large({"0", "65530", "40000", "50000"}), 655.3) << "numbers between: these are large";
+  EXPECT_DOUBLE_EQ(large({"0", "60000", "52000", "0"}), 600)
+      << "and so are these, though none is between: none is near zero";
+  EXPECT_DOUBLE_EQ(large({"0", "65535.5", "3", "4"}), 655.355) << "no register";
   // 65535 alone is what says that nothing was read.
   says(complaint("time_s,housing_degC,current_A\n0,20,1\n1,20,65535\n2,20,65535\n"), "reaches 65535 A");
 }
