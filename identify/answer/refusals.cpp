@@ -64,6 +64,16 @@ double heat_capacity_J_per_K(const Problem& problem, const Fit& f) {
   return out;
 }
 
+/// The heat that a winding takes up, of what its housing does; a cause may imitate what the other column was.
+double winding_of_housing(const Found& found) {
+  std::vector<const Fit*> fits = {&found.baseline.fit, &found.chosen.fit};
+  if (!found.singles.empty()) fits.push_back(&found.singles.front().fit);
+  double most = 0;
+  for (const Fit* f : fits) most = std::max(most, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
+  return most;
+}
+constexpr double heaviest_winding = C1_of_C2.most * beyond_catalogues;
+
 /// Nor is a housing in air that settles within this: of motors of 4 mm, the smallest sold, it takes a minute.
 constexpr double fastest_housing_s = 20;
 
@@ -487,7 +497,10 @@ std::string suspicion(const Problem& problem, const Found& found, const std::vec
   for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     if (far_too_slow(problem, *f)) return in_milliseconds(logs.front());
   }
-  if (const std::string fast = far_too_fast(problem, found, logs); !fast.empty()) return fast;
+  // A winding heavier than its housing is another matter (masses_in_each_others_place).
+  if (winding_of_housing(found) <= heaviest_winding) {
+    if (const std::string fast = far_too_fast(problem, found, logs); !fast.empty()) return fast;
+  }
   if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
   const Fit& best = found.singles.front().fit;
@@ -558,21 +571,17 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
 
 std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                                         const std::optional<wire::pc::MotorFile>& motor) {
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_sheet(problem, found);
-  const Fit& best = found.singles.front().fit;
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
-  double winding_of_housing = 0;  // a cause may imitate what the other column was
-  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
-    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
-  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
-      follows_better_swapped(problem, best, logs, motor)) {
+  const double share = winding_of_housing(found);
+  if (found.verdict != Verdict::adequate && !found.singles.empty() && both && share > heaviest_winding &&
+      follows_better_swapped(problem, found.singles.front().fit, logs, motor))
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",
-        winding_of_housing);
-  }
-  return unlike_the_sheet(problem, found);
+        share);
+  const std::string fast = far_too_fast(problem, found, logs);
+  return fast.empty() ? unlike_the_sheet(problem, found) : fast;
 }
 
 }  // namespace identify

@@ -154,13 +154,14 @@ TEST(BadInput, TimeInHoursOrDays) {
 TEST(SlowBadInput, LongHoldsInALongDayAreNoReasonToCallAMotorImpossible) {
   // At the resistance that the most it rises by would need of the mean heat, each hold makes the winding glow.
   tests::BenchOptions options;
-  options.motor = {0.75, 0.00393, 2.0, 8, 30, 225};
+  options.motor = {0.225, 0.00393, 0.56, 2.1, 108, 860};
   options.seconds = 50000;
   options.rate_Hz = 0.2;
+  options.seed = 3;
   options.current_A = [until = 0.0, held_A = 0.0](double t, std::mt19937_64& random) mutable {
     std::uniform_real_distribution<double> uniform;
     if (t >= until) {
-      held_A = until == 0 || uniform(random) < 0.7 ? 0 : 2 + 2 * uniform(random);
+      held_A = until == 0 || uniform(random) < 0.9 ? 0 : 12 + 4 * uniform(random);
       until = t + 300 + 2700 * uniform(random);
     }
     return held_A;
