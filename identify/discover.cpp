@@ -113,7 +113,7 @@ Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::o
               bool held_out, const Tell& doing) {
   Judged out;
   auto& [found, poor, vetoed] = out;
-  poor = too_poor(problem);
+  poor = too_poor(problem, logs);
   if (!poor.empty()) return out;
   found = search(problem, {}, {}, doing);
   doing("asking whether the logs can tell, and whether they are read right");

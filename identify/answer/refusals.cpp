@@ -64,21 +64,41 @@ double heat_capacity_J_per_K(const Problem& problem, const Fit& f) {
   return out;
 }
 
-/// Nor is a housing in air that settles within 20 s: of motors of 4 mm, the smallest sold, it takes a minute. And a
-/// sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
-/// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
-std::string unlike_the_motor(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
+/// The heat that a winding takes up, of what its housing does; a cause may imitate what the other column was.
+double winding_of_housing(const Found& found) {
+  std::vector<const Fit*> fits = {&found.baseline.fit, &found.chosen.fit};
+  if (!found.singles.empty()) fits.push_back(&found.singles.front().fit);
+  double most = 0;
+  for (const Fit* f : fits) most = std::max(most, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
+  return most;
+}
+constexpr double heaviest_winding = C1_of_C2.most * beyond_catalogues;
+
+/// Nor is a housing in air that settles within this: of motors of 4 mm, the smallest sold, it takes a minute.
+constexpr double fastest_housing_s = 20;
+
+std::string in_minutes(const Log& log) {
+  return fmt::format("if the time column is in minutes say {}, if in hours or days :h or :d",
+                     column_in(log, Role::time, "min"));
+}
+
+std::string far_too_fast(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   const bool in_air = std::none_of(logs.begin(), logs.end(), [](const Log& log) { return log.has(Role::coolant); });
   for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     const double settles_s = physical(f->x).R2_K_per_W * heat_capacity_J_per_K(problem, *f);
-    if (in_air && settles_s < 20 && determines_housing(problem, *f))
-      return fmt::format(
-          "The housing would settle within 20 s, as that of no motor does: if the time column is in minutes say "
-          "{}{}.",
-          column_in(logs.front(), Role::time, "min"),
-          problem.logs.front().sink_assumed ? ", and if the log begins warm say how warm the room is, --ambient DEGC"
-                                            : "");
+    if (in_air && settles_s < fastest_housing_s && determines_housing(problem, *f))
+      return fmt::format("The housing would settle within {:g} s, as that of no motor does: {}{}.", fastest_housing_s,
+                         in_minutes(logs.front()),
+                         problem.logs.front().sink_assumed
+                             ? ", and if the log begins warm say how warm the room is, --ambient DEGC"
+                             : "");
   }
+  return "";
+}
+
+/// A sheet whose winding the data contradicts by all the room there is, a factor of 30, is of another motor. What a
+/// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
+std::string unlike_the_sheet(const Problem& problem, const Found& found) {
   if (!problem.belief.known) return "";
   // Where something else is wrong, what heats slowly may pass for a winding: masses change places. Windings shipped are
   // within a factor of two of their sheet. A hot spot beside it may be the winding, and what is heavy its teeth.
@@ -400,12 +420,16 @@ bool never_changes(const Problem& problem) {
 
 }  // namespace
 
-std::string too_poor(const Problem& problem) {
+std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
   // Cautious: of two hidden logs both were named rightly with three fifths of the housing's readings gone at random; of
   // the load a seventh was too much already (masks.cpp), and of gaps three, 22 s of 20 min.
   constexpr double most_missing = 0.35, most_in_gaps = 0.3;
   constexpr double least_span_K = 2;  // a thermistor wanders by 0.05 K: resistances are then known to 3 percent at best
-  double span = 0;
+  double span = 0, lasts_s = 0;
+  for (const Bins& log : problem.logs) lasts_s += log.duration_s();
+  if (lasts_s < fastest_housing_s)
+    return fmt::format("It lasts {:.2g} s, in which no motor's housing settles; {}.", lasts_s,
+                       in_minutes(logs.front()));
   for (const Bins& log : problem.logs) {
     if (log.missing_share > most_missing)
       return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
@@ -474,6 +498,10 @@ std::string suspicion(const Problem& problem, const Found& found, const std::vec
                       const std::optional<wire::pc::MotorFile>& motor) {
   for (const Fit* f : {&found.baseline.fit, &found.chosen.fit}) {
     if (far_too_slow(problem, *f)) return in_milliseconds(logs.front());
+  }
+  // A winding heavier than its housing is another matter (masses_in_each_others_place).
+  if (winding_of_housing(found) <= heaviest_winding) {
+    if (const std::string fast = far_too_fast(problem, found, logs); !fast.empty()) return fast;
   }
   if (found.verdict == Verdict::adequate || found.singles.empty()) return "";
   // Singles were fitted to the noise of the recording alone; what was chosen may count a disturbance as noise.
@@ -545,21 +573,17 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
 
 std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                                         const std::optional<wire::pc::MotorFile>& motor) {
-  if (found.verdict == Verdict::adequate || found.singles.empty()) return unlike_the_motor(problem, found, logs);
-  const Fit& best = found.singles.front().fit;
   const bool both = std::all_of(problem.logs.begin(), problem.logs.end(),
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
-  double winding_of_housing = 0;  // a cause may imitate what the other column was
-  for (const Fit* f : {&found.baseline.fit, &found.chosen.fit, &best})
-    winding_of_housing = std::max(winding_of_housing, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
-  if (both && winding_of_housing > C1_of_C2.most * beyond_catalogues &&
-      follows_better_swapped(problem, best, logs, motor)) {
+  const double share = winding_of_housing(found);
+  if (found.verdict != Verdict::adequate && !found.singles.empty() && both && share > heaviest_winding &&
+      follows_better_swapped(problem, found.singles.front().fit, logs, motor))
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",
-        winding_of_housing);
-  }
-  return unlike_the_motor(problem, found, logs);
+        share);
+  const std::string fast = far_too_fast(problem, found, logs);
+  return fast.empty() ? unlike_the_sheet(problem, found) : fast;
 }
 
 }  // namespace identify

@@ -11,7 +11,7 @@
 namespace identify {
 
 /// Why a log cannot bear a verdict; empty when it can.
-std::string too_poor(const Problem& problem);
+std::string too_poor(const Problem& problem, const std::vector<Log>& logs);
 
 /// Shorter than the housing's time constant, or too short or of too even a load for what was found? Empty when not.
 std::string too_short(const Problem& problem, const Found& found);

@@ -32,6 +32,10 @@ const double ordinary_ripple_share = 1 / std::sqrt(12.0);
 /// (designed, hidden motor 4110).
 constexpr double ordinary_load_share = 0.002;
 
+/// Of a sensor's step: many that tell whole degrees cut off the rest, half a step on average, as many round it, which
+/// is what is assumed. The root of the mean square.
+const double ordinary_cut_share = 0.5 / std::sqrt(2.0);
+
 /// How far a room that nobody watched moves while a log is recorded, a standard deviation: in half a wave over the
 /// log; in n halves by the root of n less. Heating that is regulated holds a room to some tenths of a kelvin. All along
 /// it is as much warmer or cooler than what is taken for it.
@@ -167,6 +171,21 @@ std::optional<Leeway> reference(const Run& whole) {
   return out;
 }
 
+/// Of sensors that cut off what is below their step instead of rounding it; empty where no step is that coarse.
+std::optional<Leeway> cut_off(const Problem& problem, std::vector<std::vector<double>> Leeway::*channel,
+                              double Bins::*step_K) {
+  Leeway out;
+  double most_K = 0;
+  for (const Bins& log : problem.logs) {
+    most_K = std::max(most_K, log.*step_K);
+    out.housing_K.emplace_back(log.bins.size(), 0.0);
+    out.core_K.emplace_back(log.bins.size(), 0.0);
+    (out.*channel).back().assign(log.bins.size(), ordinary_cut_share * log.*step_K);
+  }
+  if (most_K == 0) return std::nullopt;
+  return out;
+}
+
 /// Where unwatched rooms move in `halves` half waves over their logs.
 Leeway room(const Run& whole, int halves) {
   Problem swung = whole.problem;
@@ -198,6 +217,8 @@ std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor) {
   if (problem.noise.core_slow_K > 0) out.insert(out.end(), {read_ahead(prompt), read_behind(prompt)});
   if (auto more = ripple(whole)) out.push_back(std::move(*more));
   if (auto more = reference(whole)) out.push_back(std::move(*more));
+  if (auto more = cut_off(problem, &Leeway::housing_K, &Bins::housing_step_K)) out.push_back(std::move(*more));
+  if (auto more = cut_off(problem, &Leeway::core_K, &Bins::core_step_K)) out.push_back(std::move(*more));
   const bool unwatched =
       std::any_of(problem.logs.begin(), problem.logs.end(), [](const Bins& log) { return log.sink_unwatched; });
   for (int halves = 0; unwatched && halves <= room_waves; ++halves) out.push_back(room(whole, halves));

@@ -15,9 +15,9 @@ inline constexpr const char* leeway_words =
 /// their heat better or worse than was assumed; a row whose current and winding were not read at one moment, which
 /// shows where every row has a winding's temperature: hundredths of a second looked like a hot spot or a delay there;
 /// and a winding told by its resistance that is off by what the reference at rest was, which looked like a gain of the
-/// housing's sensor; and a room that moved while nobody watched it.
-/// Causes are to be ranked by more than that. By the best fit at hand: where something is missing, that of two
-/// resistors alone is no motor.
+/// housing's sensor; a sensor that cuts whole degrees off instead of rounding to them; and a room that moved while
+/// nobody watched it. Causes are to be ranked by more than that. By the best fit at hand: where something is missing,
+/// that of two resistors alone is no motor.
 std::vector<Leeway> ordinary_leeway(const Problem& problem, const Fit& motor);
 
 /// What is mistaken for a nearer or farther winding where neither a sheet nor a reading tells of it, for the housing

@@ -358,6 +358,7 @@ Bins bins_of(const Log& log, double finest_s) {
   out.missing_share = log.missing_share;
   out.gap_share = log.gap_share;
   out.housing_step_K = log.housing_step_K;
+  out.core_step_K = log.core_step_K;
   out.core_reference = log.core_reference;
   out.notes = log.notes;
   out.has_housing = log.has(Role::housing);

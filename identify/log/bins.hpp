@@ -63,11 +63,11 @@ struct Bins {
   std::vector<Start> starts = {Start{}};         // the first at bin 0
   bool begins_warm = false;                      // or cold: the housing at another temperature than the sink
   double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences
-  double missing_share = 0, gap_share = 0, housing_step_K = 0;  // as in Log
-  Reference core_reference = {};                                // as in Log
-  double uneven_per_A2 = 0;                                     // as in Problem
-  double current_noise_A = 0;                                   // of one row's amplitude, white, as rest shows it
-  double noisy_share = 1;  // of the heat's noise by it: what speed does not take away
+  double missing_share = 0, gap_share = 0, housing_step_K = 0, core_step_K = 0;  // as in Log
+  Reference core_reference = {};                                                 // as in Log
+  double uneven_per_A2 = 0;                                                      // as in Problem
+  double current_noise_A = 0;  // of one row's amplitude, white, as rest shows it
+  double noisy_share = 1;      // of the heat's noise by it: what speed does not take away
   std::vector<std::string> notes;
 
   std::size_t bin_at(double s) const { return static_cast<std::size_t>(s / width_s + 1e-9); }  // the later at a limit

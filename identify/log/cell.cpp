@@ -164,7 +164,13 @@ bool number_in(std::string_view s, bool decimal_comma, double& value) {
     std::replace(changed.begin(), changed.end(), ',', '.');
     s = changed;
   }
-  if (s.front() == '+') s = trimmed(s.substr(1));
+  std::string joined;  // some loggers set the sign apart: "-   3.2"
+  if (s.front() == '+') {
+    s = trimmed(s.substr(1));
+  } else if (s.starts_with("- ")) {
+    joined.append("-").append(trimmed(s.substr(1)));
+    s = joined;
+  }
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
   if (error == std::errc::result_out_of_range) return value = missing, end == s.data() + s.size();
   if (error != std::errc() || end != s.data() + s.size()) return moment(s, value) || (value = missing, false);

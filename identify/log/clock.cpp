@@ -125,6 +125,7 @@ Source give_clock(Table& table, const std::vector<Session>& sessions, double per
   table.columns.push_back(std::move(time_s));
   table.words.emplace_back();
   table.of_day.push_back(false);
+  table.thousands.push_back(0);
   return {table.names.back()};
 }
 

@@ -113,6 +113,18 @@ void take_words(const Table& table, std::size_t column, Role role, std::vector<s
                               table.names[column], words.seen.front(), count));
 }
 
+/// Where each comma of a column stands before three digits, and numbers below a thousand have none, it is no decimal
+/// comma: of decimals one in ten would end sooner.
+void refuse_thousands(const Table& table, std::size_t column) {
+  constexpr int least = 10;
+  const std::vector<double>& cells = table.columns[column];
+  const int commas = table.thousands[column];
+  const auto whole = std::count_if(cells.begin(), cells.end(), [](double x) { return x == std::round(x); });
+  if (commas >= least && static_cast<std::size_t>(whole) > 0 && largest_magnitude(cells) < 1000)
+    refuse_data(fmt::format("{}: the commas of column '{}' set thousands apart; export it without them.", table.file,
+                            table.names[column]));
+}
+
 /// The only column without a role that is called nothing but time; empty: none, or several.
 std::string called_time(const Table& table, const std::map<Role, Source>& found) {
   constexpr std::string_view words[] = {"time", "timestamp", "elapsedtime", "date", "datetime", "date/time", "zeit"};
@@ -145,8 +157,13 @@ struct Likely {
   std::vector<const char*> words;
 };
 
-/// Sinusoidal currents heat by 3/2 of their rms squared what current_A heats.
-constexpr const char* rms_unit = ":1.2247A";
+/// Effective values, by a column's name: "motor_rms_current", "I [Arms]".
+bool named_rms(const std::string& name) { return has_word(name, "rms") || in_small(bracketed(name)).ends_with("rms"); }
+
+/// Sinusoidal currents heat by 3/2 of their rms squared what current_A heats; their amplitude is the root of two of it.
+const char* rms_unit(Role role) {
+  return role == Role::current ? ":1.2247A" : role == Role::iq || role == Role::id ? ":1.4142A" : "";
+}
 
 /// ROLE=COLUMN, as a command line takes it, of the first words that a column has which moves and is not `found`; empty:
 /// there is none.
@@ -160,9 +177,9 @@ std::string likely_column(const Table& table, const std::map<Role, Source>& foun
         const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
         const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
         if (!has || stands == moves) continue;
-        const std::string unit = role == Role::current && has_word(name, "rms") ? rms_unit
-                                 : role == Role::time && has_word(name, "ms")   ? ":ms"
-                                                                                : "";
+        const std::string unit = named_rms(name)                              ? rms_unit(role)
+                                 : role == Role::time && has_word(name, "ms") ? ":ms"
+                                                                              : "";
         return own_name(role) + "=" + for_a_shell(name + unit);
       }
     }
@@ -220,7 +237,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                          "map it with --column {}",
                          {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
                           {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
-                          {Role::iq, {"iq", "q-axis", "q_axis"}},
+                          {Role::iq, {"iq", "q-axis", "q_axis", "q_current", "current_q"}},
                           {Role::current, {"current", "curr", "strom", "amp"}},
                           {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
                           {Role::torque, {"torque", "effort", "drehmoment"}},
@@ -345,12 +362,15 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
   }
   refuse_without_columns(table, found, !std::isnan(map.period_s));
   note_unused_columns(table, found, notes);
-  if (const auto current = found.find(Role::current);
-      current != found.end() && has_word(current->second.column, "rms") && !current->second.unit_said)
-    notes.push_back(
-        fmt::format("The rms of a sinusoidal current heats as 1.2247 times as much direct current: if '{0}' is one of "
-                    "a phase, say --column current_A={0}{1}.",
-                    current->second.column, rms_unit));
+  for (const Role role : {Role::current, Role::iq, Role::id}) {
+    const auto at = found.find(role);
+    if (at != found.end() && named_rms(at->second.column) && !at->second.unit_said)
+      notes.push_back(fmt::format("{}: if '{}' is one of a phase, say --column {}={}.",
+                                  role == Role::current
+                                      ? "The rms of a sinusoidal current heats as 1.2247 times as much direct current"
+                                      : "The amplitude of a sinusoidal current is 1.4142 times its rms",
+                                  at->second.column, own_name(role), for_a_shell(at->second.column + rms_unit(role))));
+  }
   std::vector<std::string> by_row, by_name;
   for (auto& [role, source] : found) {
     for (const auto& [other, same] : found) {
@@ -362,17 +382,24 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
       refuse_data(
           fmt::format("{}: column '{}' stands there twice; rename or delete one of them.", table.file, source.column));
     take_words(table, index_of(table, source), role, notes);
+    refuse_thousands(table, index_of(table, source));
     if (source.unit_said) continue;
     std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
     if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
     std::vector<std::string>& by = unit.empty() ? by_name : by_row;
     if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
     // "T [case]" tells no unit; "[Umdr./min]" tells one.
-    if (const std::string told = bracketed(source.column); unit.empty() && told.find_first_of("/^%") != told.npos)
+    if (const std::string told = bracketed(source.column);
+        unit.empty() && (told.find_first_of("/^%.") != told.npos || told.find("‰") != told.npos))
       notes.push_back(fmt::format(
           "The unit '{}' of column '{}' is not known and not used; say --column {}={}:UNIT if it "
           "is not the one in {} (units: {}).",
           told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
+    else if (unit.empty() && role == Role::speed && source.column != own_name(role))
+      notes.push_back(
+          fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
+                      "in revolutions a minute.",
+                      source.column, own_name(role), for_a_shell(source.column + ":rpm")));
     if (!unit.empty())
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the units in the table, column '{}' (--column {}={}:UNIT overrules it)", table.file,

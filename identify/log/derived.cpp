@@ -61,6 +61,26 @@ std::size_t rows_at_rest(const Log& log) {
 
 }  // namespace
 
+int give_sign(std::vector<double>& cells) {
+  const double most = largest_magnitude(cells);
+  if (lowest(cells) < 0 ||
+      std::any_of(cells.begin(), cells.end(), [](double x) { return x != std::round(x) && !std::isnan(x); }))
+    return 0;
+  for (const int bits : {16, 32}) {
+    const double all = std::exp2(bits);
+    if (most >= all || most < all - all / 256) continue;  // what has a sign passes zero; 52000 rpm may be what it says
+    const auto count = [&](double from, double to) {
+      return std::count_if(cells.begin(), cells.end(), [&](double x) { return x >= from * all && x < to * all; });
+    };
+    // 65535 by itself stands for no reading.
+    const auto negative = count(0.75, 1), ones = std::count(cells.begin(), cells.end(), all - 1);
+    if (negative == ones || count(0.25, 0.75) > 0) continue;
+    for (double& x : cells) x -= x >= 0.75 * all ? all : 0;
+    return bits;
+  }
+  return 0;
+}
+
 void read_phases(Log& log) {
   std::vector<Role> told;
   for (const Role role : {Role::phase_a, Role::phase_b, Role::phase_c}) {

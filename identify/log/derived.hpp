@@ -8,6 +8,11 @@
 
 namespace identify {
 
+/// Registers of drives and servos hold negative numbers, and many a script prints them without a sign: 65535 for -1.
+/// Then small and large numbers are there and none between; these become what they are. How many bits: 16 or 32; 0:
+/// none of it.
+int give_sign(std::vector<double>& cells);
+
 /// The direct current that heats alike, of the currents of the phases at each moment: 2 R i^2 = R (a^2 + b^2 + c^2).
 /// Two of them tell the third, for a motor's star has no fourth wire.
 void read_phases(Log& log);

@@ -22,6 +22,9 @@ namespace {
 using wire::pc::refuse;
 using wire::pc::refuse_data;
 
+constexpr Role signed_roles[] = {Role::current, Role::id,     Role::iq,    Role::phase_a, Role::phase_b,
+                                 Role::phase_c, Role::torque, Role::power, Role::speed};
+
 /// Columns that are read and checked, and that nothing comes of.
 void note_unused(Log& log) {
   const auto names = [&](std::initializer_list<Role> roles) {
@@ -73,7 +76,12 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     const auto& from = table.columns[index_of(table, source)];
     auto& to = log.of(role);
     to.reserve(rows.size());
-    for (const std::size_t r : rows) to.push_back(source.factor * (from[r] + source.offset));
+    for (const std::size_t r : rows) to.push_back(from[r]);
+    const bool flows_or_turns = std::count(std::begin(signed_roles), std::end(signed_roles), role) > 0;
+    if (const int bits = flows_or_turns ? give_sign(to) : 0; bits > 0)
+      log.notes.push_back(fmt::format("Column '{}' shows negative numbers without their sign, {:.0f} for -1; read so.",
+                                      source.column, std::exp2(bits) - 1));
+    for (double& x : to) x = source.factor * (x + source.offset);
     // A sensor that is not connected; 0 degC all along, and not by a hundredth otherwise, is no weather.
     const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
                            count_told(to) > 1 && largest_magnitude(to) == 0;

@@ -43,6 +43,7 @@ struct Log {
   double sink_degC = missing;     // of a part of a log that tells no sink: what the whole began at
   bool sink_typed = false;        // it was said once for the whole log (--ambient)
   double housing_step_K = 0;      // of a sensor so coarse that only its steps are readings; else 0
+  double core_step_K = 0;         // of one as coarse, however it is read
   Reference core_reference = {};  // of readings of the winding
   bool torque_for_A = false;      // a torque stands in iq_A as it is, for want of the motor's constant
   bool loaded_before = false;     // a row's load flowed since the row before, not until the next one

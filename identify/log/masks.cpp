@@ -104,7 +104,9 @@ void read_between_steps(Log& log, Role role) {
   std::vector<double>& v = log.of(role);
   const auto& t = log.of(Role::time);
   const double step_K = step_of(v);
-  if (step_K < coarse_K || 2 * count_told(v) < v.size()) return;
+  if (step_K < coarse_K) return;
+  if (role == Role::core) log.core_step_K = step_K;
+  if (2 * count_told(v) < v.size()) return;
 
   std::vector<Step> steps;
   const double usual_s = t.back() / static_cast<double>(t.size() - 1), apart_s = std::max(hurry_s, 2.5 * usual_s);

@@ -78,7 +78,9 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
       while (close != std::string_view::npos && line.substr(close + 1, 1) == "\"")  // two of them stand for one
         close = line.find('"', close + 2);
       if (close == std::string_view::npos) return false;
-      cells.push_back(trimmed(line.substr(start + 1, close - start - 1)));
+      std::string_view cell = trimmed(line.substr(start + 1, close - start - 1));
+      if (cell.size() > 4 && cell.starts_with("\"\"") && cell.ends_with("\"\"")) cell = cell.substr(2, cell.size() - 4);
+      cells.push_back(cell);
       at = std::min(line.find(separator, close), line.size());
       if (!trimmed(line.substr(close + 1, at - close - 1)).empty()) return false;
     } else {
@@ -249,6 +251,7 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
   table.words.resize(header.size());
   table.complaints.resize(header.size());
   table.of_day.resize(header.size());
+  table.thousands.resize(header.size());
   return !numbers;
 }
 
@@ -273,8 +276,18 @@ bool number_of_column(Table& table, std::size_t column, std::string_view cell, b
   return table.units[column] == unit;
 }
 
+/// A comma where thousands are set apart: 1,234 and not 0,123.
+bool like_thousands(std::string_view cell) {
+  if (cell.front() == '-' || cell.front() == '+') cell.remove_prefix(1);
+  const std::size_t comma = cell.find(',');
+  return comma >= 1 && comma <= 3 && comma + 4 == cell.size() && cell.front() != '0' &&
+         cell.find_first_not_of("0123456789,") == std::string_view::npos;
+}
+
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
+    if (int& thousands = table.thousands[c]; thousands >= 0 && cells[c].find(',') != std::string_view::npos)
+      thousands = like_thousands(cells[c]) ? thousands + 1 : -1;
     double value = missing, unused = 0;
     if (!number_of_column(table, c, cells[c], decimal_comma, value)) {
       value = missing;

@@ -46,6 +46,7 @@ struct Table {
   std::vector<Words> words;                  // for each column
   std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
   std::vector<bool> of_day;                  // for each column: a cell of it is a time of day, without a date
+  std::vector<int> thousands;                // for each column: cells such as 1,234; -1: others have a comma too
   std::vector<int> line;                     // line number of each row, for sentences
   std::vector<std::string> notes;            // what was passed over, a sentence each
 

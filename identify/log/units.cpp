@@ -58,20 +58,18 @@ const std::map<std::string, Unit>& units() {
 /// How loggers spell these too, in small letters and without blanks.
 const std::map<std::string, std::string>& spellings() {
   static const std::map<std::string, std::string> table = {
-      {"rpm", "rpm"},       {"1/min", "rpm"},    {"min-1", "rpm"},      {"min^-1", "rpm"},
-      {"u/min", "rpm"},     {"r/min", "rpm"},    {"rev/min", "rpm"},    {"rps", "rev/s"},
-      {"rad/sec", "rad/s"}, {"rads-1", "rad/s"}, {"rad*s^-1", "rad/s"}, {"deg/sec", "deg/s"},
-      {"amp", "A"},         {"amps", "A"},       {"ampere", "A"},       {"amperes", "A"},
-      {"mamp", "mA"},       {"mamps", "mA"},     {"milliamps", "mA"},   {"watt", "W"},
-      {"watts", "W"},       {"sec", "s"},        {"secs", "s"},         {"second", "s"},
-      {"seconds", "s"},     {"msec", "ms"},      {"usec", "us"},        {"nsec", "ns"},
-      {"minutes", "min"},   {"hours", "h"},      {"days", "d"},         {"kelvin", "K"},
-      {"degc", "degC"},     {"celsius", "degC"}, {"degf", "degF"},      {"fahrenheit", "degF"},
-      {"nm", "Nm"},         {"n·m", "Nm"},       {"n*m", "Nm"},         {"n.m", "Nm"},
-      {"ohms", "ohm"},      {"°c", "degC"},      {"ºc", "degC"},        {"°f", "degF"},
-      {"ºf", "degF"},                      // º: the sign of an ordinal
-      {"µs", "us"},         {"μs", "us"},  // the sign micro, the letter mu
-      {"Ω", "ohm"},         {"mΩ", "mohm"},      {"Ω", "ohm"},          {"mΩ", "mohm"},  // the letter, the sign ohm
+      {"rpm", "rpm"},        {"1/min", "rpm"},     {"min-1", "rpm"}, {"min^-1", "rpm"},      {"u/min", "rpm"},
+      {"r/min", "rpm"},      {"rev/min", "rpm"},   {"rps", "rev/s"}, {"rad/sec", "rad/s"},   {"rads-1", "rad/s"},
+      {"rad*s^-1", "rad/s"}, {"deg/sec", "deg/s"}, {"amp", "A"},     {"amps", "A"},          {"ampere", "A"},
+      {"amperes", "A"},      {"mamp", "mA"},       {"mamps", "mA"},  {"milliamps", "mA"},    {"watt", "W"},
+      {"watts", "W"},        {"sec", "s"},         {"secs", "s"},    {"second", "s"},        {"seconds", "s"},
+      {"ms", "ms"},          {"us", "us"},         {"ns", "ns"},     {"msec", "ms"},         {"usec", "us"},
+      {"nsec", "ns"},        {"minutes", "min"},   {"hours", "h"},   {"days", "d"},          {"kelvin", "K"},
+      {"degc", "degC"},      {"celsius", "degC"},  {"degf", "degF"}, {"fahrenheit", "degF"}, {"nm", "Nm"},
+      {"n·m", "Nm"},         {"n*m", "Nm"},        {"n.m", "Nm"},    {"ohms", "ohm"},        {"°c", "degC"},
+      {"ºc", "degC"},        {"°f", "degF"},       {"ºf", "degF"},                    // º: the sign of an ordinal
+      {"℃", "degC"},         {"℉", "degF"},        {"µs", "us"},     {"μs", "us"},    // the sign micro, the letter mu
+      {"Ω", "ohm"},          {"mΩ", "mohm"},       {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter, the sign ohm
   };
   return table;
 }
@@ -129,10 +127,15 @@ std::string unit_in_name(const std::string& column, const std::string& role) {
   const std::string wanted = quantity_of_role(role);
   const auto fits = [&](const std::string& unit) { return !wanted.empty() && quantity_of(unit) == wanted; };
   if (const std::string unit = bracketed(column); !unit.empty()) return fits(unit) ? unit : "";
-  for (std::size_t cut = column.find_first_of("_ "); cut != std::string::npos;
-       cut = column.find_first_of("_ ", cut + 1)) {
-    const std::string unit = column.substr(cut + 1);
-    if (unit.size() > 1 && fits(unit)) return unit;
+  // A name may be one (RPM), or end in one: speed_rpm, MotorRPM, n/rpm. One letter is one behind a slash alone, T/K.
+  const auto small = [&](std::size_t at) { return column[at] >= 'a' && column[at] <= 'z'; };
+  const auto capital = [&](std::size_t at) { return column[at] >= 'A' && column[at] <= 'Z'; };
+  for (std::size_t at = 0; at < column.size(); ++at) {
+    const char before = at == 0 ? '_' : column[at - 1];
+    const bool begins =
+        std::string_view("_ ./").find(before) != std::string_view::npos || (at > 0 && small(at - 1) && capital(at));
+    const std::string unit = column.substr(at);
+    if (begins && (unit.size() > 1 || before == '/') && fits(unit)) return unit;
   }
   return "";
 }

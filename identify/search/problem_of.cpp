@@ -52,8 +52,8 @@ constexpr std::size_t most_rough_bins = 8000;
 constexpr double guessed_housing_s[] = {120, 600, 2400}, guessed_R1_of_R2[] = {0.1, 0.6}, guessed_winding_share = 0.02;
 constexpr double guessed_log_sd = 2.3, guessed_log_room = 9;
 
-/// With the rise that this log shows.
-std::vector<Belief> guesses_of(const Problem& problem) {
+/// With the rise that this log shows, at `share` of the resistance that its mean heat would need for it.
+std::vector<Belief> guesses_of(const Problem& problem, double share) {
   double rise_K = 1;
   for (const Bin& bin : problem.logs.front().bins) {
     const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;
@@ -65,7 +65,7 @@ std::vector<Belief> guesses_of(const Problem& problem) {
       Belief b = problem.belief;
       b.log_sd = guessed_log_sd;
       b.log_room = guessed_log_room;
-      b.R2_K_per_W = rise_K / std::max(1e-9, problem.heat_W);
+      b.R2_K_per_W = share * rise_K / std::max(1e-9, problem.heat_W);
       b.R1_K_per_W = ratio * b.R2_K_per_W;
       b.C2_J_per_K = housing_s / b.R2_K_per_W;
       b.C1_J_per_K = guessed_winding_share * housing_s / b.R1_K_per_W;
@@ -99,13 +99,19 @@ void rough_search(Problem& whole) {
     belief.C1_J_per_K = believed(p.C1_J_per_K, C1_of_C2, belief.C2_J_per_K);
     return belief;
   };
-  const std::vector<Belief> guesses = guesses_of(problem);
-  std::vector<Fit> fits(guesses.size());
-  in_parallel(guesses.size(), [&](std::size_t i) {
-    Problem guessed = problem;
-    guessed.belief = guesses[i];
-    fits[i] = fit(guessed, {});
-  });
+  std::vector<Belief> guesses;
+  std::vector<Fit> fits;
+  const auto valid = [](const Fit& f) { return f.valid(); };
+  // The mean heat is little beside that of long holds, under which all guesses may glow: then of less resistance.
+  for (double share = 1; share > 0.01 && std::none_of(fits.begin(), fits.end(), valid); share /= 2) {
+    guesses = guesses_of(problem, share);
+    fits.assign(guesses.size(), {});
+    in_parallel(guesses.size(), [&](std::size_t i) {
+      Problem guessed = problem;
+      guessed.belief = guesses[i];
+      fits[i] = fit(guessed, {});
+    });
+  }
   const auto least =
       std::min_element(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.cost < b.cost; });
   if (!least->valid()) return;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Logs that are spoilt get a plain sentence, and never a confident name.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +29,6 @@ using tests::says;
 /// A good log whose rows `edit` spoils: (time, current, speed, housing, ambient, winding or empty).
 std::string spoilt(const std::function<bool(std::vector<std::string>&, int)>& edit, tests::BenchOptions options = {}) {
   options.core_every_s = 20;
-  options.seconds = 900;
   const std::string path = tests::write_bench_log("hotcore_spoilt.csv", options);
   std::ifstream in(path);
   std::string line, out;
@@ -134,10 +134,41 @@ TEST(SlowBadInput, TimeInMillisecondsOfAMotorThatHasACause) {
 
 TEST(SlowBadInput, TimeInMinutes) {
   const auto in_min = [](auto& row, int) { return row[0] = std::to_string(std::stod(row[0]) / 60), true; };
-  const Outcome r = run(spoilt(in_min) + " --explain");
+  tests::BenchOptions options;
+  options.seconds = 1800;
+  const Outcome r = run(spoilt(in_min, options) + " --explain");
   says(r.out, "Verdict: insufficient");
   says(r.out, "--column time_s=time_s:min");
   says(r.out, "Two resistors were fitted by likelihood");
+}
+
+TEST(BadInput, TimeInHoursOrDays) {
+  for (const double unit_s : {3600.0, 86400.0}) {
+    const auto in_unit = [&](auto& row, int) {
+      return row[0] = fmt::format("{:.8f}", std::stod(row[0]) / unit_s), true;
+    };
+    refused(spoilt(in_unit), "say --column time_s=time_s:min, if in hours or days :h or :d");
+  }
+}
+
+TEST(SlowBadInput, LongHoldsInALongDayAreNoReasonToCallAMotorImpossible) {
+  // At the resistance that the most it rises by would need of the mean heat, each hold makes the winding glow.
+  tests::BenchOptions options;
+  options.motor = {0.225, 0.00393, 0.56, 2.1, 108, 860};
+  options.seconds = 50000;
+  options.rate_Hz = 0.2;
+  options.seed = 3;
+  options.current_A = [until = 0.0, held_A = 0.0](double t, std::mt19937_64& random) mutable {
+    std::uniform_real_distribution<double> uniform;
+    if (t >= until) {
+      held_A = until == 0 || uniform(random) < 0.9 ? 0 : 12 + 4 * uniform(random);
+      until = t + 300 + 2700 * uniform(random);
+    }
+    return held_A;
+  };
+  const Outcome r = run(tests::write_bench_log("hotcore_long_holds.csv", options));
+  EXPECT_EQ(r.code, 0) << r.out;
+  says(r.out, "Verdict: adequate");
 }
 
 TEST(SlowBadInput, ALightHousingOnAHeavyMassIsAMotorAllTheSame) {

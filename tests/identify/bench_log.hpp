@@ -26,6 +26,7 @@ struct BenchOptions {
   double seconds = 900, rate_Hz = 10, ambient_degC = 24, start_degC = 24;
   double room_K = 0, room_period_s = 1800;            // by how much and how fast the ambient swings
   double white_K = 0.2, slow_K = 0.05, step_K = 0.1;  // housing sensor
+  bool cuts_off = false;                              // what is below its step, instead of rounding it
   double sensor_share = 0;                            // of the way from housing to winding, where that sensor sits
   double core_every_s = 0, core_white_K = 0.2;        // 0: no winding reading
   double core_lag_s = 0;                              // of the sensor in the winding
@@ -71,7 +72,8 @@ inline std::string write_bench_log(const std::string& name, const BenchOptions& 
     const double core = (T[0] + T[1] + T[2]) / 3;
     felt += (core - felt) * (o.core_lag_s > 0 ? 1 - std::exp(-1 / (o.rate_Hz * o.core_lag_s)) : 1);
     double housing = T[3] + o.sensor_share * (core - T[3]) + slow + o.white_K * normal(random);
-    if (o.step_K > 0) housing = o.step_K * std::round(housing / o.step_K);
+    if (o.step_K > 0)
+      housing = o.step_K * (o.cuts_off ? std::floor(housing / o.step_K) : std::round(housing / o.step_K));
     const double amplitude = current * 2 / std::sqrt(3.0);
     const double heat25 = m.ohm * amplitude * amplitude;
     const auto phase_W = [&](const State& at, int k) {

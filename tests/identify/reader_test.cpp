@@ -203,6 +203,98 @@ TEST(Reader, ANamesEndThatIsNoUnitOfTheRoleIsIgnored) {
   }
 }
 
+TEST(Reader, ANameThatIsAUnitOrEndsInOneTellsIt) {
+  const auto read_as = [](Role role, const std::string& column) {
+    ColumnMap map;
+    add_column(map, identify::own_name(role) + "=" + column);
+    std::string names = column, first = "0", second = "60";
+    for (const Role other : {Role::time, Role::current, Role::housing}) {
+      if (other != role) names += "," + identify::own_name(other), first += ",20", second += ",21";
+    }
+    return read(names + "\n" + first + "\n" + second + "\n", map)[0].of(role)[1];
+  };
+  for (const char* rpm : {"RPM", "MotorRPM", "motorRpm", "n/rpm", "esc.rpm", "n/1/min"})
+    EXPECT_NEAR(read_as(Role::speed, rpm), 60 * 0.104719755, 1e-6) << rpm;
+  EXPECT_NEAR(read_as(Role::time, "TimeUS"), 60e-6, 1e-12);
+  EXPECT_NEAR(read_as(Role::time, "elapsedMs"), 0.06, 1e-12);
+  EXPECT_NEAR(read_as(Role::time, "t/min"), 3600, 1e-9);
+  EXPECT_NEAR(read_as(Role::current, "I/mA"), 0.06, 1e-12);
+  for (const char* degF : {"T/F", "Case (\u2109)"}) EXPECT_NEAR(read_as(Role::housing, degF), 15.5555556, 1e-6) << degF;
+}
+
+TEST(Reader, ASpeedWhoseUnitNobodyTellsIsSaidToBeReadInRadians) {
+  const auto notes = [](const std::string& column) {
+    ColumnMap map;
+    add_column(map, "speed_rad_per_s=" + column);
+    const auto log = read("time_s,current_A,housing_degC,velocity\n0,1,20,60\n1,2,21,60\n", map)[0];
+    return fmt::format("{}", fmt::join(log.notes, " "));
+  };
+  says(notes("velocity"), "No unit of column 'velocity' is known; it is read in rad/s. Say --column speed_rad_per_s=");
+  EXPECT_EQ(notes("velocity:rad/s").find("No unit"), std::string::npos);
+}
+
+TEST(Reader, OfEffectiveValuesItIsSaidWhatTheyHeat) {
+  const auto notes = [](const char* role, const std::string& column) {
+    ColumnMap map;
+    add_column(map, std::string(role) + "=" + column);
+    const auto log = read("time_s," + column + ",housing_degC\n0,1,20\n1,2,21\n", map)[0];
+    return fmt::format("{}", fmt::join(log.notes, " "));
+  };
+  says(notes("current_A", "I [Arms]"), "say --column current_A=\"I [Arms]:1.2247A\"");
+  says(notes("iq_A", "Iq_rms"), "say --column iq_A=Iq_rms:1.4142A");
+  says(notes("current_A", "I [\u2030]"), "The unit '\u2030' of column 'I [\u2030]' is not known and not used");
+}
+
+TEST(Reader, NegativeNumbersThatLostTheirSignHaveItAgain) {
+  const auto current = [](const std::vector<const char*>& cells) {
+    ColumnMap map;
+    add_column(map, "current_A=present_current:10mA");
+    std::string text = "time_s,housing_degC,present_current\n";
+    for (std::size_t i = 0; i < cells.size(); ++i) text += fmt::format("{},20,{}\n", i, cells[i]);
+    return read(text, map)[0];
+  };
+  const Log log = current({"0", "500", "65535", "65036", "7"});
+  EXPECT_EQ(log.of(Role::current), (std::vector<double>{0, 5, -0.01, -5, 0.07}));
+  says(log.notes.at(0), "Column 'present_current' shows negative numbers without their sign, 65535 for -1; read so.");
+  EXPECT_EQ(current({"0", "4294967196", "4294967295"}).of(Role::current), (std::vector<double>{0, -1, -0.01}));
+  const auto large = [&](const std::vector<const char*>& cells) { return current(cells).of(Role::current)[1]; };
+  EXPECT_DOUBLE_EQ(large({"0", "65530", "40000", "50000"}), 655.3) << "numbers between: these are large";
+  EXPECT_DOUBLE_EQ(large({"0", "60000", "52000", "0"}), 600)
+      << "and so are these, though none is between: none is near zero";
+  EXPECT_DOUBLE_EQ(large({"0", "65535.5", "3", "4"}), 655.355) << "no register";
+  // 65535 alone is what says that nothing was read.
+  says(complaint("time_s,housing_degC,current_A\n0,20,1\n1,20,65535\n2,20,65535\n"), "reaches 65535 A");
+}
+
+TEST(Reader, CommasThatSetThousandsApartAreNoDecimalCommas) {
+  const auto table = [](const char* format, double step) {
+    std::string text = "time_s\tcurrent_A\thousing_degC\tspeed_rpm\n";
+    for (int i = 0; i < 50; ++i) {
+      std::string cell = fmt::format(fmt::runtime(format), i * step);
+      text += fmt::format("{}\t{}\t20\t{}\n", i, i % 3, cell);
+    }
+    return text;
+  };
+  std::string thousands = table("{:.0f}", 77);
+  for (int i = 13; i < 50; ++i) {
+    const std::string plain = fmt::format("\t{}\n", i * 77);
+    thousands.replace(thousands.find(plain), plain.size(), fmt::format("\t{},{:03}\n", i * 77 / 1000, i * 77 % 1000));
+  }
+  says(complaint(thousands), "the commas of column 'speed_rpm' set thousands apart; export it without them");
+  std::string decimals = table("{:.3f}", 0.077);
+  for (std::size_t at = 0; (at = decimals.find('.', at)) != std::string::npos;) decimals[at] = ',';
+  EXPECT_NEAR(read(decimals)[0].of(Role::speed)[20], 1.54 * 0.104719755, 1e-9);
+}
+
+TEST(Reader, QuotesInQuotesAndASignSetApartAreUnderstood) {
+  const auto logs = read(
+      "time_s,current_A,housing_degC\n\"\"\"2022-10-26T08:00:00Z\"\"\",-   1.5,+  20.5\n"
+      "\"\"\"2022-10-26T08:00:02Z\"\"\",-  12,-   1\n");
+  EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 2}));
+  EXPECT_EQ(logs[0].of(Role::current), (std::vector<double>{-1.5, -12}));
+  EXPECT_EQ(logs[0].of(Role::housing), (std::vector<double>{20.5, -1}));
+}
+
 TEST(Reader, ARoomIsToldOnceForAllRowsWhereNoColumnTellsIt) {
   ColumnMap map;
   map.ambient_degC = 22;
@@ -647,6 +739,7 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
   says(complaint("I_bus,t\n1,0\n2,1\n"), "--column current_A=NAME");
   const std::string vesc = complaint("ms_today,temp_motor,current_motor,erpm\n0,20,1,1\n1,21,2,2\n");
   for (const char* column : {"time_s=ms_today:ms", "iq_A=current_motor"}) says(vesc, column);
+  says(complaint("time_s,q_current,temp\n0,1,20\n1,2,21\n"), "--column iq_A=q_current");
   says(complaint("time_s,i_a,i_b,temp\n0,1,1,20\n1,2,2,21\n"), "--column phase_a_A=i_a");
   says(complaint("time,motor_rms_current,temp\n0,1,20\n1,2,21\n"), "--column current_A=motor_rms_current:1.2247A");
   says(complaint("Date,Time,P_loss,temp\n1/2/2026,1:00 PM,1,20\n"), "--column power_W=P_loss");

@@ -208,6 +208,23 @@ TEST(SlowSearch, WholeDegreesAreEnoughForAName) {
   }
 }
 
+TEST(SlowSearch, ASensorThatCutsWholeDegreesOffInsteadOfRoundingHasNoOffset) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    tests::BenchOptions o;
+    o.seconds = 2700;
+    o.white_K = o.slow_K = 0.02;
+    o.step_K = 1;
+    o.cuts_off = true;
+    o.core_every_s = 20;
+    o.seed = seed;
+    const auto found = identify::search(identify::problem_of(tests::bench_logs({o}), tests::ec_16()));
+    EXPECT_EQ(found.verdict, Verdict::adequate) << "an offset of half a degree was named";
+  }
+  expect_named(
+      {.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 2, .effects = {"sensor_offset"}, .step_K = 1},
+      "what is more than half a step");
+}
+
 TEST(SlowSearch, WhatTheStepsOfWholeDegreesAreOffByIsNotMissing) {
   const Hidden clean = hidden({.duty = tests::Duty::designed, .seed = 789000, .step_K = 1});
   EXPECT_EQ(identify::search(clean.problem).verdict, Verdict::adequate)
