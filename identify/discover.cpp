@@ -12,6 +12,7 @@
 #include "identify/answer/held_out.hpp"
 #include "identify/answer/model_file.hpp"
 #include "identify/answer/refusals.hpp"
+#include "identify/answer/untold.hpp"
 #include "identify/fit/leeway.hpp"
 #include "identify/fit/replayed.hpp"
 #include "identify/log/masks.hpp"

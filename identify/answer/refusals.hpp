@@ -20,14 +20,6 @@ std::string too_short(const Problem& problem, const Found& found);
 std::string suspicion(const Problem& problem, const Found& found, const std::vector<Log>& logs,
                       const std::optional<wire::pc::MotorFile>& motor);
 
-/// Does the sensor of what heats reach no further than what it shows most? Empty when it does, and when two resistors
-/// are adequate all the same.
-std::string clipped(const Found& found, const std::vector<Log>& logs);
-
-/// May what was found, or what nothing explains, be of rows too far apart, or of a load that cells do not tell? Empty
-/// when not.
-std::string too_sparse(const Problem& problem, const Found& found, const std::vector<Log>& logs);
-
 /// Does a winding that is too heavy stand for another mass, the housing or none of this motor's? Empty when not. Asked
 /// last: degrees of another size and a load that is not what flowed make a winding heavy too.
 std::string masses_in_each_others_place(const Problem& problem, const Found& found, const std::vector<Log>& logs,

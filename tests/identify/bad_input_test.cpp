@@ -12,6 +12,7 @@
 
 #include "identify/answer/refusals.hpp"
 #include "identify/answer/report.hpp"
+#include "identify/answer/untold.hpp"
 #include "identify/discover.hpp"
 #include "identify/fit/fit.hpp"
 #include "identify/search/problem_of.hpp"
