@@ -164,6 +164,7 @@ void Application::supply_falls() {
   // The fast lane has nothing left to drive and would run late behind the flash; if the supply comes back, the window
   // watchdog, which nobody feeds any more, starts everything anew.
   reg(system::nvic_icer) = bit(adc_irq.irq);
+  stage_.stop_sampling();  // where this came into a tick, what is left of that must not meet another conversion
   keeper_.last_words(good_);
 }
 

@@ -93,6 +93,10 @@ void PowerStage::arm(int axis) {
   armed_ = axis;
 }
 
+void PowerStage::stop_sampling() {
+  for (int unit = 1; unit <= 3; ++unit) reg(adc::base(unit) + adc::cr2) = bit(0);
+}
+
 int PowerStage::take() {
   std::uint32_t status[3];
   for (int unit = 1; unit <= 3; ++unit) status[unit - 1] = reg(adc::base(unit) + adc::sr);

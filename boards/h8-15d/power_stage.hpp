@@ -28,6 +28,8 @@ class PowerStage {
   hal::AxisSample sample(int axis);
   void drive(int axis, const hal::Duty& duty);
   void release(int axis);
+  /// No conversion is triggered any more. Any context.
+  void stop_sampling();
 
   /// Rotor: counter value that is mechanical zero; written by the index interrupt.
   void set_encoder_zero(int axis, std::uint32_t counter) { encoder_zero_[axis] = counter; }
