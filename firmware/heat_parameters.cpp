@@ -13,8 +13,8 @@ enum : std::uint16_t {
 };
 
 // Five steps of the slow lane for a phase among the others, fifty for a winding alone: what is faster the governor
-// cannot hold. Of 8000 motors above, none passed its limit by 3 K, whatever the demand and the rotor did; windings of
-// 0.2 to 0.4 s by up to 8 K, of 0.05 to 0.1 s by 30 K (test_thermal --gtest_filter=Governor.NoDemand*).
+// cannot hold. Of 8000 motors above none passed its limit by 3 K, whatever the demand and the rotor did (300 of them
+// are drawn in test_thermal, Governor.NoDemand*); windings of 0.2 to 0.4 s by up to 8 K, of 0.05 to 0.1 s by 30 K.
 constexpr float shortest_winding_s = 0.5f, shortest_phase_s = 0.05f;
 }  // namespace
 
