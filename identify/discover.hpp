@@ -2,8 +2,11 @@
 // From logs to a report: fit, judge, name, extend, measure the gain.
 #pragma once
 
+#include <optional>
+
 #include "identify/answer/held_out.hpp"
 #include "identify/search/doing.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 

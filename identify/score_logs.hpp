@@ -2,9 +2,11 @@
 // How often the answers to logs are what was hidden in them: identify --score.
 #pragma once
 
+#include <optional>
 #include <functional>
 
 #include "identify/answer/report.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 

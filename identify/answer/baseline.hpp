@@ -2,7 +2,10 @@
 // The two-resistor model alone: fitted, judged, and said in words. What the search for causes starts from.
 #pragma once
 
+#include <optional>
+
 #include "identify/answer/report.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 

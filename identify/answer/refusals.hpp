@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "identify/search/search.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 

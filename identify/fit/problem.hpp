@@ -3,13 +3,11 @@
 // are.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "identify/log/bins.hpp"
 #include "identify/model/cause.hpp"
-#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 

@@ -2,7 +2,10 @@
 // From logs to a problem: bins as fine as the winding asks for, the readings' noise, and what is believed of the motor.
 #pragma once
 
+#include <optional>
+
 #include "identify/fit/problem.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace identify {
 
