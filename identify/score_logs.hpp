@@ -2,8 +2,8 @@
 // How often the answers to logs are what was hidden in them: identify --score.
 #pragma once
 
-#include <optional>
 #include <functional>
+#include <optional>
 
 #include "identify/answer/report.hpp"
 #include "wire/pc/motor_file.hpp"
