@@ -109,14 +109,16 @@ struct Judged {
   bool vetoed = false;
 };
 
-/// `held_out`: part of the data is, and a cause that spoils the last quarter of the rest is refused.
-Judged judged(const Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
+/// Readings whose load is in no log are left out of the problem. `held_out`: part of the data is, and a cause that
+/// spoils the last quarter of the rest is refused.
+Judged judged(Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
               bool held_out, const Tell& doing) {
   Judged out;
   auto& [found, poor, vetoed] = out;
   poor = too_poor(problem, logs);
   if (!poor.empty()) return out;
   found = search(problem, {}, {}, doing);
+  if (found.late.s != 0) problem = heard(std::move(problem), found.late);
   doing("asking whether the logs can tell, and whether they are read right");
   poor = too_short(problem, found);
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
@@ -192,12 +194,13 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     for (Log& log : logs) log = without_last(std::move(log), held.fraction);
   }
   doing("fitting two resistors");
-  const Problem problem = problem_of(logs, motor);
+  Problem problem = problem_of(logs, motor);
   std::optional<Problem> unseen;
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
   const Fit first = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
+  if (unseen && found.late.s != 0) unseen = heard(std::move(*unseen), found.late);
   widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;

@@ -76,8 +76,6 @@ std::uint32_t Core::word(std::uint32_t address) const {
   uc_mem_read(uc_, address, &v, 4);
   return v;
 }
-void Core::poke(std::uint32_t address, std::uint32_t value) { uc_mem_write(uc_, address, &value, 4); }
-
 void Core::forget_code() {
   for (const Range& r : stale_) {
     const std::uint32_t first = (r.address - flash_base) / 2;

@@ -79,7 +79,6 @@ class Core {
   std::uint8_t* ram() { return ram_.data(); }
   std::uint8_t* system_memory() { return system_.data(); }
   std::uint32_t word(std::uint32_t address) const;
-  void poke(std::uint32_t address, std::uint32_t value);
   /// Translated code of this range is forgotten before the core goes on.
   void refresh_flash(std::uint32_t address, std::uint32_t size) { stale_.push_back({address, size}); }
 

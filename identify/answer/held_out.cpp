@@ -123,7 +123,7 @@ void judge(const Problem& problem, const Fit& baseline, const Fit& extended, int
 Problem unseen_of(const Problem& fitted, const std::vector<Log>& logs, const HoldOut& held) {
   Problem out = unseen_by(fitted, held.fraction > 0 ? logs : held.logs);
   for (std::size_t l = 0; held.fraction > 0 && l < out.logs.size(); ++l)
-    forget_readings(out.logs[l],
+    forget_readings(out.logs[l], 0,
                     static_cast<std::size_t>(std::ceil(fitted.logs[l].duration_s() / out.logs[l].width_s - 1e-6)));
   return out;
 }

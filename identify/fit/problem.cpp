@@ -116,9 +116,21 @@ Problem last_part(const Problem& problem, double fraction) {
   Problem out = problem;
   for (Bins& log : out.logs) {
     const auto cut = static_cast<std::size_t>((1 - fraction) * static_cast<double>(log.bins.size()));
-    forget_readings(log, cut);
+    forget_readings(log, 0, cut);
   }
   return out;
+}
+
+Problem heard(Problem problem, const Late& late) {
+  for (Bins& log : problem.logs) {
+    const std::size_t all = log.bins.size();
+    const auto bins = [&](double s) {
+      return static_cast<std::size_t>(std::clamp(std::ceil(s / log.width_s), 0.0, static_cast<double>(all)));
+    };
+    forget_readings(log, 0, bins(late.s + late.sure_s));
+    forget_readings(log, all - bins(late.sure_s - late.s), all);
+  }
+  return problem;
 }
 
 Problem unseen_by(const Problem& fitted, const std::vector<Log>& logs) {

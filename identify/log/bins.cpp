@@ -407,8 +407,8 @@ Bins bins_of(const Log& log, double finest_s) {
   return out;
 }
 
-void forget_readings(Bins& log, std::size_t before) {
-  for (std::size_t k = 0; k < std::min(before, log.bins.size()); ++k) {
+void forget_readings(Bins& log, std::size_t from, std::size_t before) {
+  for (std::size_t k = from; k < std::min(before, log.bins.size()); ++k) {
     log.bins[k].housing_n = log.bins[k].core_n = 0;
     log.bins[k].housing_degC = log.bins[k].core_degC = missing;
   }

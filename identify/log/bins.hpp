@@ -83,8 +83,8 @@ Bins bins_of(const Log& log, double finest_s);
 /// to who knows it.
 void add_moment(Bin& bin, double share, double amplitude_A, double sampled_A, double speed_rad_per_s);
 
-/// Takes the readings before a bin away; what they said of the start stays.
-void forget_readings(Bins& log, std::size_t before);
+/// Takes the readings of the bins from one to before another away; what they said of the start stays.
+void forget_readings(Bins& log, std::size_t from, std::size_t before);
 
 /// Every `together` bins as one.
 Bins merged(const Bins& log, std::size_t together);

@@ -119,6 +119,14 @@ void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vecto
   fit_alone(problem, all, field);
 }
 
+/// Nothing where it is not what explains the logs best, alone.
+Late late_by(const Field& field, const Margins& margins) {
+  if (field.singles.empty() || !(field.singles.front().evidence > margins.detect)) return {};
+  const Fit& best = field.singles.front().fit;
+  const int delay = coordinate_of(best, Edit::delay);
+  return delay < 0 ? Late{} : Late{best.x[delay], 2 * best.std_errors()[delay]};
+}
+
 /// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
 bool noticeable(const Problem& problem, const Disturbance& d, const Margins& margins) {
   return d.evidence > margins.remains &&
@@ -407,11 +415,25 @@ Found search(const Problem& given, const Margins& margins, const std::vector<std
   Found out;
   Field field;
   const auto all = available(problem, without);
+  const auto fit_alone_from = [&](Problem from) {
+    problem = std::move(from);
+    out.plain_baseline = fit(problem, {});
+    if (!out.plain_baseline.valid()) return false;
+    problem.leeway = ordinary_leeway(problem, out.plain_baseline);
+    fit_alone_and_settle_noise(problem, out.plain_baseline, all, margins, field, out);
+    return true;
+  };
   doing("fitting each cause alone");
-  out.plain_baseline = fit(problem, {});
-  if (!out.plain_baseline.valid()) return out;
-  problem.leeway = ordinary_leeway(problem, out.plain_baseline);
-  fit_alone_and_settle_noise(problem, out.plain_baseline, all, margins, field, out);
+  if (!fit_alone_from(given)) return out;
+  out.late = late_by(field, margins);
+  if (out.late.s != 0) {
+    out.steps = {
+        fmt::format("Alone, temperatures {:.0f} s {} explain most: what they answer to at the {} of a log is not "
+                    "in it, so {:.0f} s of readings there are left out.",
+                    std::abs(out.late.s), out.late.s > 0 ? "late" : "early", out.late.s > 0 ? "begin" : "end",
+                    std::abs(out.late.s) + out.late.sure_s)};
+    if (!fit_alone_from(heard(given, out.late))) return out;
+  }
   out.baseline = out.chosen = field.baseline;
   out.noise = problem.noise;
   out.singles = field.singles;

@@ -802,6 +802,24 @@ TEST(SlowReport, TwoClocksTwoMinutesApartAreToldByHowMuch) {
   EXPECT_NEAR(std::stod(sentence.substr(sentence.find(before) + before.size())), 120, 3) << sentence;
 }
 
+TEST(SlowSearch, ReadingsOfALoadAfterTheLogsEndShowNoCause) {
+  for (const std::uint64_t seed : {4, 5}) {
+    Hidden log = hidden({.duty = tests::Duty::designed, .seed = seed, .effects = {"windage"}});
+    constexpr std::ptrdiff_t early = 500;  // rows of 0.1 s
+    auto& columns = log.logs[0].columns;
+    for (std::size_t role = 0; role < columns.size(); ++role) {
+      const bool read = role == static_cast<std::size_t>(identify::Role::housing) ||
+                        role == static_cast<std::size_t>(identify::Role::core);
+      if (columns[role].empty()) continue;
+      const auto from = read ? columns[role].begin() : columns[role].end() - early;
+      columns[role].erase(from, from + early);
+    }
+    const auto found = identify::search(identify::problem_of(log.logs, log.log.sheet));
+    EXPECT_EQ(found.verdict, Verdict::explained) << seed << ": was mostly winding_eddy beside the delay";
+    EXPECT_EQ(found.tied.front(), (std::vector<std::string>{"clock_delay", "windage"})) << seed;
+  }
+}
+
 TEST(SlowReport, AWindingThatTakesUpMoreHeatThanItsHousingIsASwappedColumn) {
   Hidden log = hidden({.duty = tests::Duty::designed, .core = tests::Core::dense, .seed = 11, .effects = {"windage"}});
   EXPECT_TRUE(identify::names_causes(identify::discover(log.logs, log.log.sheet).verdict));
