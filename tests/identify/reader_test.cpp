@@ -727,7 +727,35 @@ TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
   says(sentence, "a time column and the heat input (current_A, iq_A, power_W or torque_Nm) and a measured temperature");
   says(sentence, "--column time_s=\"Start time [s]\"");
   says(sentence, "--column current_A=\"Current [A]\"");
-  says(sentence, "--column housing_degC=\"T_winding [C]\"");
+  says(sentence, "--column core_degC=\"T_winding [C]\"");
+}
+
+TEST(Reader, WhatIsMissingIsToldWithAllThatTheFileHasOfUse) {
+  // Sessions of a bench, without a clock.
+  const std::string bench = complaint(
+      "u_q,coolant,coil_end,i_d,i_q,stator,rotor_speed,yoke,ambient,torque,profile_id\n"
+      "1,20,20,0,1,1,5,20,22,1,7\n2,21,22,1,2,2,6,21,23,2,7\n");
+  for (const char* column : {"iq_A=i_q", "id_A=i_d", "housing_degC=yoke", "core_degC=coil_end", "ambient_degC=ambient",
+                             "coolant_degC=coolant", "session=profile_id", "speed_rad_per_s=rotor_speed"})
+    says(bench, std::string("--column ") + column);
+  const std::string stand =
+      complaint("Time (s),Winding Temp (\u00b0C),Ambient (\u00b0C),Stator (\u00b0C)\n0,20,20,20\n1,30,20,21\n");
+  says(stand, "--column housing_degC=\"Stator (\u00b0C)\"");
+  says(stand, "--column core_degC=\"Winding Temp (\u00b0C)\"");
+  says(stand, "--column current_A=NAME, or join it to this table by time if it was recorded in another");
+  const std::string drive = complaint("ms_today,temp_motor,q_axis_current,vesc_id,d_axis_current,erpm\n0,20,1,3,0,1\n");
+  says(drive, "--column id_A=d_axis_current");
+  says(drive, "--column speed_rad_per_s=erpm (electrical: with its unit, as :0.1429rpm of seven pole pairs)");
+}
+
+TEST(Reader, AnAmplitudeWithoutTheOtherIsToldWithItsColumn) {
+  ColumnMap map;
+  add_column(map, "iq_A=motor_iq");
+  add_column(map, "speed_rad_per_s=erpm");
+  const auto notes = read("time_s,motor_id,motor_iq,erpm,housing_degC\n0,1,1,0,20\n1,2,2,7,21\n", map)[0].notes;
+  const std::string said = fmt::format("{}", fmt::join(notes, " "));
+  says(said, "say --column id_A=motor_id");
+  says(said, "say --column speed_rad_per_s=erpm:0.1429rpm of a motor of seven pole pairs");
 }
 
 TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
@@ -752,6 +780,10 @@ TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string notes = fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
   says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm)");
   says(notes, "say --column core_degC=T_winding.");
+  const std::string core_only = "time_s,current_A,core_degC,T_case,n_rpm\n0,1,20,20,0\n1,2,21,21,9\n";
+  const std::string told = fmt::format("{}", fmt::join(read(core_only)[0].notes, " "));
+  says(told, "say --column housing_degC=T_case.");
+  says(told, "say --column speed_rad_per_s=n_rpm.");
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
