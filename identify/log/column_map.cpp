@@ -335,6 +335,25 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                           fmt::join(table.names, ", ")));
 }
 
+/// What a row of units says of a column; empty: nothing.
+std::string unit_in_row(const Table& table, const std::string& column) {
+  std::string unit = table.units.empty() ? "" : table.units[index_of(table, {column})];
+  if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+  return unit;
+}
+
+/// Beside others in Fahrenheit a temperature without a unit is hardly in Celsius.
+void ask_for_the_unit(const Table& table, const std::string& column, Role role) {
+  for (const std::string& other : table.names) {
+    std::string unit = unit_in_row(table, other);
+    if (unit.empty()) unit = unit_in_name(other, own_name(role));
+    const auto known = unit_named(unit);
+    if (known && known->quantity == "temperature" && known->factor != 1)
+      refuse_data(fmt::format("{}: column '{}' tells no unit, and '{}' is in {}; say --column {}={}, or :degC.",
+                              table.file, column, other, unit, own_name(role), for_a_shell(column + ":degF")));
+  }
+}
+
 }  // namespace
 
 std::size_t index_of(const Table& table, const Source& source) {
@@ -453,8 +472,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     take_words(table, index_of(table, source), role, notes);
     refuse_thousands(table, index_of(table, source));
     if (source.unit_said) continue;
-    std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
-    if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+    std::string unit = unit_in_row(table, source.column);
     std::vector<std::string>& by = unit.empty() ? by_name : by_row;
     if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
     // "T [case]" tells no unit; "[Umdr./min]" tells one.
@@ -473,6 +491,8 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
                       "in revolutions a minute.",
                       source.column, own_name(role), for_a_shell(source.column + ":rpm")));
+    if (unit.empty() && std::count(std::begin(temperatures), std::end(temperatures), role) > 0)
+      ask_for_the_unit(table, source.column, role);
     if (!unit.empty())
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the units in the table, column '{}' (--column {}={}:UNIT overrules it)", table.file,

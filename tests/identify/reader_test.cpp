@@ -748,6 +748,22 @@ TEST(Reader, WhatIsMissingIsToldWithAllThatTheFileHasOfUse) {
   says(drive, "--column speed_rad_per_s=erpm (electrical: with its unit, as :0.1429rpm of seven pole pairs)");
 }
 
+TEST(Reader, ATemperatureWithoutAUnitBesideOthersInFahrenheitIsAskedFor) {
+  ColumnMap map;
+  add_column(map, "housing_degC=Motor Temp");
+  const std::string rows = "time_s,current_A,Probe (\u00baF),Motor Temp\n0,1,71,71\n1,2,71,72\n";
+  says(complaint(rows, map),
+       "column 'Motor Temp' tells no unit, and 'Probe (\u00baF)' is in \u00baF; say --column housing_degC=\"Motor "
+       "Temp:degF\", or :degC");
+  ColumnMap said;
+  add_column(said, "housing_degC=Motor Temp:degF");
+  EXPECT_NEAR(read(rows, said)[0].of(Role::housing)[1], 22.2, 0.1);
+  ColumnMap own;
+  add_column(own, "ambient_degC=Probe (\u00baF)");
+  EXPECT_EQ(read("time_s,current_A,Probe (\u00baF),housing_degC\n0,1,71,21\n1,2,71,22\n", own)[0].of(Role::housing)[1],
+            22);
+}
+
 TEST(Reader, AnAmplitudeWithoutTheOtherIsToldWithItsColumn) {
   ColumnMap map;
   add_column(map, "iq_A=motor_iq");
