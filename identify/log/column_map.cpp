@@ -132,6 +132,9 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
   const auto is_time = [&](const std::string& name) {
     const bool taken = std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
     std::string bare = name.substr(0, name.find_first_of("[("));
+    if (const std::size_t cut = bare.rfind('_');
+        cut != bare.npos && cut > 0 && quantity_of(bare.substr(cut + 1)) == "time")
+      bare.resize(cut);
     std::erase_if(bare, [](char c) { return c == '_' || c == ' ' || c == '%'; });
     const bool says_so =
         bare == "t" || std::find(std::begin(words), std::end(words), in_small(bare)) != std::end(words);
@@ -180,6 +183,12 @@ std::vector<std::string> columns_of(const std::map<Role, Source>& found) {
   return out;
 }
 
+/// Metres a second, or the like: of what the motor drives.
+bool of_a_vehicle(const std::string& name) {
+  return has_word(name, "mps") || has_word(name, "kmh") || has_word(name, "km/h") || has_word(name, "meters") ||
+         has_word(name, "m/s");
+}
+
 /// Of the first words that a column has which moves and is not `taken`.
 std::optional<Guess> likely_column(const Table& table, const std::vector<std::string>& taken,
                                    const std::vector<Likely>& likely) {
@@ -188,6 +197,7 @@ std::optional<Guess> likely_column(const Table& table, const std::vector<std::st
       for (std::size_t c = 0; c < table.names.size(); ++c) {
         const std::string& name = table.names[c];
         if (std::find(taken.begin(), taken.end(), name) != taken.end()) continue;
+        if (role == Role::speed && of_a_vehicle(name)) continue;
         const std::vector<double>& cells = table.columns[c];
         const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
         const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;

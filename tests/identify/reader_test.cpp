@@ -719,6 +719,8 @@ TEST(Reader, AColumnCalledTimeIsTheTime) {
     says(log.notes[0], fmt::format("Column '{}' is taken for the time", name));
   }
   EXPECT_DOUBLE_EQ(read("Time (ms),current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(read("start_s,t_s,current_A,housing_degC\n9,0,1,20\n9,5,2,21\n")[0].of(Role::time)[1], 5);
+  EXPECT_DOUBLE_EQ(read("timestamp_ms,current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
   says(complaint("time,t,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
 }
 
@@ -800,6 +802,9 @@ TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string told = fmt::format("{}", fmt::join(read(core_only)[0].notes, " "));
   says(told, "say --column housing_degC=T_case.");
   says(told, "say --column speed_rad_per_s=n_rpm.");
+  const std::string of_a_car =
+      fmt::format("{}", fmt::join(read("time_s,current_A,housing_degC,speed_mps\n0,1,20,0\n1,2,21,9\n")[0].notes, " "));
+  EXPECT_EQ(of_a_car.find("speed_mps"), std::string::npos) << "metres a second are no motor's";
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
