@@ -105,7 +105,8 @@ double rows_ahead(const Problem& problem, const Fit& f) {
 /// The search, and what speaks against answering by it.
 struct Judged {
   Found found;
-  std::string poor;  // why there is no verdict; empty: there is one
+  std::string poor;     // why there is no verdict; empty: there is one
+  bool misses = false;  // two resistors, more than noise explains: only the log is too short to say why
   bool vetoed = false;
 };
 
@@ -114,13 +115,14 @@ struct Judged {
 Judged judged(Problem& problem, const std::vector<Log>& logs, const std::optional<wire::pc::MotorFile>& motor,
               bool held_out, const Tell& doing) {
   Judged out;
-  auto& [found, poor, vetoed] = out;
+  auto& [found, poor, misses, vetoed] = out;
   poor = too_poor(problem, logs);
   if (!poor.empty()) return out;
   found = search(problem, {}, {}, doing);
   if (found.late.s != 0) problem = heard(std::move(problem), found.late);
   doing("asking whether the logs can tell, and whether they are read right");
   poor = too_short(problem, found);
+  misses = !poor.empty() && found.verdict != Verdict::adequate;
   if (poor.empty()) poor = suspicion(problem, found, logs, motor);
   if (poor.empty()) poor = clipped(found, logs);
   if (poor.empty()) poor = too_sparse(problem, found, logs);
@@ -199,7 +201,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   if (held.fraction > 0 || !held.logs.empty()) unseen = unseen_of(problem, given, held);
   const Fit first = fit_baseline(problem);
   report.reasoning = noise_words(problem);
-  auto [found, poor, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
+  auto [found, poor, misses, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
   if (unseen && found.late.s != 0) unseen = heard(std::move(*unseen), found.late);
   widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
@@ -209,13 +211,13 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const bool near = poor.empty() && !extended && !vetoed && !found.chosen.fit.chosen.empty();
   // Both models as the search fitted them last: with what no motor is without, and out of the valleys it knows.
   const Fit baseline = found.baseline.fit.valid() ? found.baseline.fit : first;
-  const bool wrong = poor.empty() && found.verdict != Verdict::adequate;
+  const bool wrong = misses || (poor.empty() && found.verdict != Verdict::adequate);
   const Fit compared = wrong ? as_unsure_as_unseen(problem, closest(problem, baseline)) : baseline;
   judge_baseline(problem, compared, found.baseline.ratio, logs, motor, report);
   const Fit& answer = extended ? found.chosen.fit : baseline;
   if (!poor.empty()) {
     report.verdict = found.verdict = Verdict::insufficient;
-    report.sentence = "This log cannot tell what the simulation gets wrong. " + poor;
+    report.sentence = no_verdict(report, logs.size(), misses) + " " + poor;
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {

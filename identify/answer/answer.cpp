@@ -178,7 +178,7 @@ std::string sentence(const Found& found, const Report& r) {
             listed(names_of(found.sets.front().fit.chosen), " and "));
       return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
     case Verdict::insufficient:
-      return "This log cannot tell what the simulation gets wrong.";
+      return "";  // no_verdict
   }
   return "";
 }
@@ -290,6 +290,17 @@ void tell(const Problem& problem, const Found& found, const std::vector<Log>& lo
 void say(const Problem& problem, const Found& found, Report& report) {
   report.sentence = sentence(found, report);
   tell_that_a_room_is_assumed(problem, found, report);
+}
+
+std::string no_verdict(const Report& report, std::size_t logs, bool misses) {
+  const Rmse& e = report.baseline_rmse;
+  const bool core = !std::isnan(e.core_K);
+  const double miss_K = core ? e.core_K : e.housing_K;
+  if (!misses || std::isnan(miss_K))
+    return fmt::format("{} cannot tell what the simulation gets wrong.", logs > 1 ? "These logs" : "This log");
+  return fmt::format(
+      "The two-resistor model misses the {} by {:.2f} K rms, more than the noise explains; why, {} cannot tell.",
+      core ? "winding" : "housing", miss_K, logs > 1 ? "these logs" : "this log");
 }
 
 void shorten_names(std::vector<LogPlot>& plots) {

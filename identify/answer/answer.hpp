@@ -19,6 +19,9 @@ void tell(const Problem& problem, const Found& found, const std::vector<Log>& lo
 /// And the sentence, which needs the errors and causes that stand there.
 void say(const Problem& problem, const Found& found, Report& report);
 
+/// The sentence where there is no verdict, without the reason; `misses`: two resistors do, more than noise explains.
+std::string no_verdict(const Report& report, std::size_t logs, bool misses);
+
 /// Each log by its file alone, and by as many of the folders above it as tell it from the others.
 void shorten_names(std::vector<LogPlot>& plots);
 

@@ -296,8 +296,8 @@ std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
   double span = 0, lasts_s = 0;
   for (const Bins& log : problem.logs) lasts_s += log.duration_s();
   if (lasts_s < fastest_housing_s)
-    return fmt::format("It lasts {:.2g} s, in which no motor's housing settles; {}.", lasts_s,
-                       in_minutes(logs.front()));
+    return fmt::format("{} {:.2g} s, in which no motor's housing settles; {}.",
+                       problem.logs.size() > 1 ? "Together they last" : "It lasts", lasts_s, in_minutes(logs.front()));
   for (const Bins& log : problem.logs) {
     if (log.missing_share > most_missing)
       return fmt::format("{}: {:.0f} % of the readings or rows are missing or frozen; record it again.", log.name,
@@ -350,7 +350,8 @@ std::string too_short(const Problem& problem, const Found& found) {
   for (const Bins& log : problem.logs) lasts_s += log.duration_s();
   if (lasts_s < housing_s) {
     const bool known = problem.belief.known || determines_housing(problem, plain);
-    return fmt::format("It lasts {:.0f} s, less than the housing's time constant{}; record longer.", lasts_s,
+    return fmt::format("{} {:.0f} s, less than the housing's time constant{}; record longer.",
+                       problem.logs.size() > 1 ? "Together they last" : "It lasts", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
   const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };

@@ -9,6 +9,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "identify/log/units.hpp"
 #include "wire/pc/names.hpp"
@@ -131,6 +132,9 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
   const auto is_time = [&](const std::string& name) {
     const bool taken = std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
     std::string bare = name.substr(0, name.find_first_of("[("));
+    if (const std::size_t cut = bare.rfind('_');
+        cut != bare.npos && cut > 0 && quantity_of(bare.substr(cut + 1)) == "time")
+      bare.resize(cut);
     std::erase_if(bare, [](char c) { return c == '_' || c == ' ' || c == '%'; });
     const bool says_so =
         bare == "t" || std::find(std::begin(words), std::end(words), in_small(bare)) != std::end(words);
@@ -165,14 +169,35 @@ const char* rms_unit(Role role) {
   return role == Role::current ? ":1.2247A" : role == Role::iq || role == Role::id ? ":1.4142A" : "";
 }
 
-/// ROLE=COLUMN, as a command line takes it, of the first words that a column has which moves and is not `found`; empty:
-/// there is none.
-std::string likely_column(const Table& table, const std::map<Role, Source>& found, const std::vector<Likely>& likely) {
+/// A column, and what it may be.
+struct Guess {
+  Role role;
+  std::string column, unit;  // "", or as ":ms"
+  /// As a command line takes it.
+  std::string option() const { return "--column " + own_name(role) + "=" + for_a_shell(column + unit); }
+};
+
+std::vector<std::string> columns_of(const std::map<Role, Source>& found) {
+  std::vector<std::string> out;
+  for (const auto& [unused, source] : found) out.push_back(source.column);
+  return out;
+}
+
+/// Metres a second, or the like: of what the motor drives.
+bool of_a_vehicle(const std::string& name) {
+  return has_word(name, "mps") || has_word(name, "kmh") || has_word(name, "km/h") || has_word(name, "meters") ||
+         has_word(name, "m/s");
+}
+
+/// Of the first words that a column has which moves and is not `taken`.
+std::optional<Guess> likely_column(const Table& table, const std::vector<std::string>& taken,
+                                   const std::vector<Likely>& likely) {
   for (const bool moves : {true, false}) {
     for (const auto& [role, words] : likely) {
       for (std::size_t c = 0; c < table.names.size(); ++c) {
         const std::string& name = table.names[c];
-        if (std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; })) continue;
+        if (std::find(taken.begin(), taken.end(), name) != taken.end()) continue;
+        if (role == Role::speed && of_a_vehicle(name)) continue;
         const std::vector<double>& cells = table.columns[c];
         const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
         const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
@@ -180,27 +205,66 @@ std::string likely_column(const Table& table, const std::map<Role, Source>& foun
         const std::string unit = named_rms(name)                              ? rms_unit(role)
                                  : role == Role::time && has_word(name, "ms") ? ":ms"
                                                                               : "";
-        return own_name(role) + "=" + for_a_shell(name + unit);
+        return Guess{role, name, unit};
       }
     }
   }
-  return "";
+  return std::nullopt;
 }
 
-/// Columns that nothing needs, and that would tell more.
-void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
-  const struct {
-    Likely likely;
-    const char* what;
-  } useful[] = {{{Role::speed, {"velocity", "speed", "rpm", "erpm", "omega", "drehzahl"}}, "the motor's speed"},
-                {{Role::core, {"winding", "coil", "wicklung"}}, "the winding's temperature"},
-                {{Role::ambient, {"ambient", "room", "umgebung"}}, "the room's temperature"}};
-  for (const auto& [likely, what] : useful) {
-    const std::string column = found.contains(likely.role) ? "" : likely_column(table, found, {likely});
-    if (!column.empty())
-      notes.push_back(fmt::format("A column may be {} and is not used: if it is, say --column {}{}.", what, column,
-                                  likely.role == Role::speed ? " (and its unit, as :rpm)" : ""));
+/// Turns of the field, not of the shaft.
+bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "electric"); }
+
+/// What has to be said with a speed's column whose name tells no unit of the shaft's.
+std::string speed_words(const std::string& name) {
+  if (named_electrical(name)) return " (electrical: with its unit, as :0.1429rpm of seven pole pairs)";
+  return unit_in_name(name, own_name(Role::speed)).empty() ? " (and its unit, as :rpm)" : "";
+}
+
+/// The current in d beside that in q: its name with a d for a q.
+std::optional<Guess> twin_of(const Table& table, std::string q) {
+  for (char& c : q) {
+    const char as_it_was = c;
+    c = c == 'q' ? 'd' : c == 'Q' ? 'D' : c;
+    if (c != as_it_was && table.find(q) >= 0) return Guess{Role::id, q, ""};
+    c = as_it_was;
   }
+  return std::nullopt;
+}
+
+const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung"}}},
+                          housings = {{Role::housing, {"housing", "casing", "case", "yoke", "geh\u00e4use"}},
+                                      {Role::housing, {"stator"}}},
+                          rooms = {{Role::ambient, {"ambient", "room", "umgebung"}}},
+                          coolants = {{Role::coolant, {"coolant"}}};
+
+/// Columns that nothing needs, and that would tell more; `what` each is.
+std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
+  const std::pair<std::vector<Likely>, const char*> useful[] = {
+      {{{Role::speed, {"velocity", "speed", "rpm", "erpm", "omega", "drehzahl"}}}, "the motor's speed"},
+      {windings, "the winding's temperature"},
+      {housings, "the housing's temperature"},
+      {rooms, "the room's temperature"},
+      {coolants, "the coolant's temperature"},
+      {{{Role::session, {"session", "profile_id", "run_id", "test_id", "episode"}}}, "what tells sessions apart"}};
+  std::vector<std::pair<Guess, const char*>> out;
+  for (const auto& [likely, what] : useful) {
+    const auto guess =
+        found.contains(likely.front().role) ? std::nullopt : likely_column(table, columns_of(found), likely);
+    if (!guess) continue;
+    found[guess->role] = {guess->column};
+    out.emplace_back(*guess, what);
+  }
+  if (found.contains(Role::iq) && !found.contains(Role::id)) {
+    if (const auto twin = twin_of(table, found.at(Role::iq).column)) out.emplace_back(*twin, "the current in d");
+  }
+  return out;
+}
+
+void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
+  for (const auto& [guess, what] : useful_columns(table, found))
+    notes.push_back(fmt::format("A column may be {} and is not used: if it is, say {}{}.", what, guess.option(),
+                                guess.role == Role::speed ? speed_words(guess.column) : ""));
 }
 
 /// Databases and dashboards export one value a row, beside what it is of.
@@ -221,49 +285,83 @@ void refuse_one_value_a_row(const Table& table) {
                     table.file, value, of));
 }
 
-/// All that is missing at once, each with the column that its name speaks for.
-void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
-  struct Need {
-    std::vector<Role> any_of;
-    const char *what, *hint;
-    std::vector<Likely> likely;
-  };
-  const Need needs[] = {{{Role::time},
-                         "a time column",
-                         "call it time_s, say --column {}, or --period S where the rows are S seconds apart",
-                         {{Role::time, {"time", "zeit", "stamp", "ms"}}, {Role::time, {"date", "datum"}}}},
-                        {{Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque},
-                         "the heat input (current_A, iq_A, power_W or torque_Nm)",
-                         "map it with --column {}",
-                         {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
-                          {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
-                          {Role::iq, {"iq", "q-axis", "q_axis", "q_current", "current_q"}},
-                          {Role::current, {"current", "curr", "strom", "amp"}},
-                          {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
-                          {Role::torque, {"torque", "effort", "drehmoment"}},
-                          {Role::power, {"loss", "p_loss", "verlust"}},
-                          {Role::power, {"power", "watt", "leistung"}}}},
-                        {{Role::housing, Role::core},
-                         "a measured temperature (housing_degC or core_degC)",
-                         "map it with --column {}",
-                         {{Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp"}},
-                          {Role::housing, {"temp", "degc", "\u00b0c", "t_"}}}}};
-  std::vector<std::string> missing_ones, hints;
-  for (const Need& need : needs) {
-    if ((by_row && need.any_of.front() == Role::time) ||
-        std::any_of(need.any_of.begin(), need.any_of.end(), [&](Role r) { return found.contains(r); }))
-      continue;
-    missing_ones.emplace_back(need.what);
-    const std::string likely = likely_column(table, found, need.likely);
-    hints.push_back(
-        fmt::format(fmt::runtime(need.hint), likely.empty() ? own_name(need.likely.front().role) + "=NAME" : likely));
-    if (likely.starts_with(own_name(Role::power))) hints.back() += " if that is what heats the winding";
+/// A temperature of the motor, where no column has such a role: the housing's rather than the winding's.
+std::optional<Guess> likely_temperature(const Table& table, const std::map<Role, Source>& found) {
+  std::vector<std::string> taken = columns_of(found);
+  const auto winding = likely_column(table, taken, windings);
+  for (const auto& other : {windings, rooms, coolants}) {
+    while (const auto of_it = likely_column(table, taken, other)) taken.push_back(of_it->column);
   }
+  std::vector<Likely> likely = housings;
+  likely.insert(likely.begin(), {Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp"}});
+  if (!winding) likely.push_back({Role::housing, {"temp", "degc", "\u00b0c", "t_"}});
+  const auto housing = likely_column(table, taken, likely);
+  return housing ? housing : winding;
+}
+
+/// All that is missing at once, each with the column that its name speaks for, and with what else is of use.
+void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
+  const auto none_of = [&](std::initializer_list<Role> roles) {
+    return std::none_of(roles.begin(), roles.end(), [&](Role r) { return found.contains(r); });
+  };
+  std::map<Role, Source> taken = found;
+  std::vector<std::string> missing_ones, hints;
+  const auto ask_for = [&](const char* what, const std::optional<Guess>& guess, const char* hint, Role otherwise) {
+    missing_ones.emplace_back(what);
+    if (guess) taken[guess->role] = {guess->column};
+    hints.push_back(
+        fmt::format(fmt::runtime(hint), guess ? guess->option() : "--column " + own_name(otherwise) + "=NAME"));
+  };
+  if (!by_row && none_of({Role::time}))
+    ask_for("a time column",
+            likely_column(table, columns_of(taken),
+                          {{Role::time, {"time", "zeit", "stamp", "ms"}}, {Role::time, {"date", "datum"}}}),
+            "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
+  if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
+    const auto guess = likely_column(table, columns_of(taken),
+                                     {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
+                                      {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
+                                      {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
+                                      {Role::current, {"current", "curr", "strom", "amp"}},
+                                      {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
+                                      {Role::torque, {"torque", "effort", "drehmoment"}},
+                                      {Role::power, {"loss", "p_loss", "verlust"}},
+                                      {Role::power, {"power", "watt", "leistung"}}});
+    ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
+    if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";
+    if (guess && guess->role == Role::power) hints.back() += " if that is what heats the winding";
+  }
+  if (none_of({Role::housing, Role::core}))
+    ask_for("a measured temperature (housing_degC or core_degC)", likely_temperature(table, taken), "map it with {}",
+            Role::housing);
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);
+  std::vector<std::string> useful;
+  for (const auto& [guess, unused] : useful_columns(table, taken))
+    useful.push_back(guess.option() + (guess.role == Role::speed ? speed_words(guess.column) : ""));
+  if (!useful.empty()) hints.push_back(fmt::format("of use as well: {}", fmt::join(useful, ", ")));
   refuse_data(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
                           missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "),
                           fmt::join(table.names, ", ")));
+}
+
+/// What a row of units says of a column; empty: nothing.
+std::string unit_in_row(const Table& table, const std::string& column) {
+  std::string unit = table.units.empty() ? "" : table.units[index_of(table, {column})];
+  if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+  return unit;
+}
+
+/// Beside others in Fahrenheit a temperature without a unit is hardly in Celsius.
+void ask_for_the_unit(const Table& table, const std::string& column, Role role) {
+  for (const std::string& other : table.names) {
+    std::string unit = unit_in_row(table, other);
+    if (unit.empty()) unit = unit_in_name(other, own_name(role));
+    const auto known = unit_named(unit);
+    if (known && known->quantity == "temperature" && known->factor != 1)
+      refuse_data(fmt::format("{}: column '{}' tells no unit, and '{}' is in {}; say --column {}={}, or :degC.",
+                              table.file, column, other, unit, own_name(role), for_a_shell(column + ":degF")));
+  }
 }
 
 }  // namespace
@@ -384,8 +482,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     take_words(table, index_of(table, source), role, notes);
     refuse_thousands(table, index_of(table, source));
     if (source.unit_said) continue;
-    std::string unit = table.units.empty() ? "" : table.units[index_of(table, source)];
-    if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+    std::string unit = unit_in_row(table, source.column);
     std::vector<std::string>& by = unit.empty() ? by_name : by_row;
     if (unit.empty()) unit = unit_in_name(source.column, own_name(role));
     // "T [case]" tells no unit; "[Umdr./min]" tells one.
@@ -395,11 +492,17 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
           "The unit '{}' of column '{}' is not known and not used; say --column {}={}:UNIT if it "
           "is not the one in {} (units: {}).",
           told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
+    else if (role == Role::speed && named_electrical(source.column))
+      notes.push_back(
+          fmt::format("Column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs.",
+                      source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
     else if (unit.empty() && role == Role::speed && source.column != own_name(role))
       notes.push_back(
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
                       "in revolutions a minute.",
                       source.column, own_name(role), for_a_shell(source.column + ":rpm")));
+    if (unit.empty() && std::count(std::begin(temperatures), std::end(temperatures), role) > 0)
+      ask_for_the_unit(table, source.column, role);
     if (!unit.empty())
       apply_unit(unit, own_name(role),
                  fmt::format("{}: the units in the table, column '{}' (--column {}={}:UNIT overrules it)", table.file,

@@ -272,14 +272,31 @@ Left left_by_chosen(const Problem& problem, const Problem& judged, const Found& 
   return out;
 }
 
+/// How far each pair is behind the best where the housing is believed no closer than a model can be right.
+std::vector<double> behind_as_models_are_right(const Problem& judged, const Margins& margins, const Found& found) {
+  std::vector<double> out(found.sets.size(), 1e300);
+  if (found.chosen.fit.chosen.size() < 2) return out;
+  const Problem less = believed_less(judged, found.chosen.fit, 1);
+  const double best = fit(less, found.chosen.fit.chosen, {&found.chosen.fit}).surprise();
+  in_parallel(out.size(), [&](std::size_t i) {
+    const Candidate& c = found.sets[i];
+    if (c.chosen || found.chosen.evidence - c.evidence > margins.pairs_near) return;
+    out[i] = fit(less, c.fit.chosen, {&c.fit}).surprise() - best;
+  });
+  return out;
+}
+
 /// Which sets are as good, and which nearly, so that a board must not take them for excluded? What is left over may
 /// belong to any of them. Told are the next best and those that differ from the best by no more than twice what is left
 /// (Margins::left_apart).
-void mark_ties(const Problem& problem, const Left& left, double lead, const Margins& margins, Found& out) {
+void mark_ties(const Problem& problem, const Problem& judged, const Left& left, double lead, const Margins& margins,
+               Found& out) {
   const double by_noise_K = of_current_K(problem, margins), slack = left.complete ? 0 : left.evidence;
+  const std::vector<double> nearer = behind_as_models_are_right(judged, margins, out);
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
-  for (Candidate& c : out.sets) {
-    const double behind = out.chosen.evidence - c.evidence;
+  for (std::size_t i = 0; i < out.sets.size(); ++i) {
+    Candidate& c = out.sets[i];
+    const double behind = std::min(out.chosen.evidence - c.evidence, nearer[i]);
     if (c.chosen || (behind >= margins.tie + slack && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;
@@ -456,7 +473,7 @@ Found search(const Problem& given, const Margins& margins, const std::vector<std
   const bool alone = out.chosen.fit.chosen.size() == 1;
   const double lead = alone && problem.belief.known ? margins.tie_alone : margins.tie;
   const double reach = left.complete ? lead : lead + left.evidence;
-  mark_ties(problem, left, lead, margins, out);
+  mark_ties(problem, judged, left, lead, margins, out);
   decide(problem, left, without_causes, reach, margins, out);
   doing("fitting what a board gets");
   refit_for_the_board(judged, margins, out);

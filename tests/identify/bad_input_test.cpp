@@ -114,7 +114,19 @@ TEST(BadInput, NothingThatVaries) {
 }
 
 TEST(BadInput, ShorterThanTheHousingsTimeConstant) {
-  refused(spoilt([](auto&, int row) { return row < 1200; }), "less than the housing's time constant");
+  const std::string path = spoilt([](auto&, int row) { return row < 1200; });
+  refused(path, "This log cannot tell what the simulation gets wrong. It lasts 120 s, less than the housing's time");
+  const std::string again = path + ".again.csv";
+  std::filesystem::copy_file(path, again, std::filesystem::copy_options::overwrite_existing);
+  refused(path + " " + again, "These logs cannot tell what the simulation gets wrong. Together they last 240 s");
+}
+
+TEST(SlowBadInput, WhatTwoResistorsMissIsSaidOfALogTooShortToSayWhy) {
+  tests::BenchOptions options;
+  options.extra_housing_W = [](double t, double, double) { return 10 * (1 + std::sin(t / 9)); };
+  const std::string path = spoilt([](auto&, int row) { return row < 2000; }, options);
+  refused(path, "The two-resistor model misses the ");
+  refused(path, " K rms, more than the noise explains; why, this log cannot tell. It lasts 200 s, less than");
 }
 
 TEST(SlowBadInput, TimeInMilliseconds) {

@@ -719,6 +719,8 @@ TEST(Reader, AColumnCalledTimeIsTheTime) {
     says(log.notes[0], fmt::format("Column '{}' is taken for the time", name));
   }
   EXPECT_DOUBLE_EQ(read("Time (ms),current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(read("start_s,t_s,current_A,housing_degC\n9,0,1,20\n9,5,2,21\n")[0].of(Role::time)[1], 5);
+  EXPECT_DOUBLE_EQ(read("timestamp_ms,current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
   says(complaint("time,t,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
 }
 
@@ -727,7 +729,51 @@ TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
   says(sentence, "a time column and the heat input (current_A, iq_A, power_W or torque_Nm) and a measured temperature");
   says(sentence, "--column time_s=\"Start time [s]\"");
   says(sentence, "--column current_A=\"Current [A]\"");
-  says(sentence, "--column housing_degC=\"T_winding [C]\"");
+  says(sentence, "--column core_degC=\"T_winding [C]\"");
+}
+
+TEST(Reader, WhatIsMissingIsToldWithAllThatTheFileHasOfUse) {
+  // Sessions of a bench, without a clock.
+  const std::string bench = complaint(
+      "u_q,coolant,coil_end,i_d,i_q,stator,rotor_speed,yoke,ambient,torque,profile_id\n"
+      "1,20,20,0,1,1,5,20,22,1,7\n2,21,22,1,2,2,6,21,23,2,7\n");
+  for (const char* column : {"iq_A=i_q", "id_A=i_d", "housing_degC=yoke", "core_degC=coil_end", "ambient_degC=ambient",
+                             "coolant_degC=coolant", "session=profile_id", "speed_rad_per_s=rotor_speed"})
+    says(bench, std::string("--column ") + column);
+  const std::string stand =
+      complaint("Time (s),Winding Temp (\u00b0C),Ambient (\u00b0C),Stator (\u00b0C)\n0,20,20,20\n1,30,20,21\n");
+  says(stand, "--column housing_degC=\"Stator (\u00b0C)\"");
+  says(stand, "--column core_degC=\"Winding Temp (\u00b0C)\"");
+  says(stand, "--column current_A=NAME, or join it to this table by time if it was recorded in another");
+  const std::string drive = complaint("ms_today,temp_motor,q_axis_current,vesc_id,d_axis_current,erpm\n0,20,1,3,0,1\n");
+  says(drive, "--column id_A=d_axis_current");
+  says(drive, "--column speed_rad_per_s=erpm (electrical: with its unit, as :0.1429rpm of seven pole pairs)");
+}
+
+TEST(Reader, ATemperatureWithoutAUnitBesideOthersInFahrenheitIsAskedFor) {
+  ColumnMap map;
+  add_column(map, "housing_degC=Motor Temp");
+  const std::string rows = "time_s,current_A,Probe (\u00baF),Motor Temp\n0,1,71,71\n1,2,71,72\n";
+  says(complaint(rows, map),
+       "column 'Motor Temp' tells no unit, and 'Probe (\u00baF)' is in \u00baF; say --column housing_degC=\"Motor "
+       "Temp:degF\", or :degC");
+  ColumnMap said;
+  add_column(said, "housing_degC=Motor Temp:degF");
+  EXPECT_NEAR(read(rows, said)[0].of(Role::housing)[1], 22.2, 0.1);
+  ColumnMap own;
+  add_column(own, "ambient_degC=Probe (\u00baF)");
+  EXPECT_EQ(read("time_s,current_A,Probe (\u00baF),housing_degC\n0,1,71,21\n1,2,71,22\n", own)[0].of(Role::housing)[1],
+            22);
+}
+
+TEST(Reader, AnAmplitudeWithoutTheOtherIsToldWithItsColumn) {
+  ColumnMap map;
+  add_column(map, "iq_A=motor_iq");
+  add_column(map, "speed_rad_per_s=erpm");
+  const auto notes = read("time_s,motor_id,motor_iq,erpm,housing_degC\n0,1,1,0,20\n1,2,2,7,21\n", map)[0].notes;
+  const std::string said = fmt::format("{}", fmt::join(notes, " "));
+  says(said, "say --column id_A=motor_id");
+  says(said, "say --column speed_rad_per_s=erpm:0.1429rpm of a motor of seven pole pairs");
 }
 
 TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
@@ -752,6 +798,13 @@ TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string notes = fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
   says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm)");
   says(notes, "say --column core_degC=T_winding.");
+  const std::string core_only = "time_s,current_A,core_degC,T_case,n_rpm\n0,1,20,20,0\n1,2,21,21,9\n";
+  const std::string told = fmt::format("{}", fmt::join(read(core_only)[0].notes, " "));
+  says(told, "say --column housing_degC=T_case.");
+  says(told, "say --column speed_rad_per_s=n_rpm.");
+  const std::string of_a_car =
+      fmt::format("{}", fmt::join(read("time_s,current_A,housing_degC,speed_mps\n0,1,20,0\n1,2,21,9\n")[0].notes, " "));
+  EXPECT_EQ(of_a_car.find("speed_mps"), std::string::npos) << "metres a second are no motor's";
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
