@@ -78,7 +78,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   degC_ = Vector::Constant(n_, ambient_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  sensor_degC_ = ambient_degC_;
+  sensor_degC_ = sensed_degC(ambient_degC_);
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
   due_K_ = Row::Zero(n_ + 5);
@@ -160,11 +160,18 @@ void CoreEstimator::step() {
   input_[Boundary::ambient] = ambient_degC_;
   propagate_covariance(network_.rates(degC_, input_));
   degC_ = network_.step(transition_, degC_, input_);
-  const double target =
-      degC_[housing_.node] * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
+  const double target = sensed_degC(degC_[housing_.node]);
   const double moved_K = (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
   late_K_ += moved_K - late_take_ * (target - sensor_degC_ + late_K_);
   sensor_degC_ += moved_K;
+}
+
+/// What the sensor reads of a housing that has been as warm as this for long, and the other way round.
+double CoreEstimator::sensed_degC(double housing_degC) const {
+  return housing_degC * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
+}
+double CoreEstimator::housing_of_degC(double sensed_degC) const {
+  return (sensed_degC + 25.0 * housing_.gain_error - housing_.offset_K) / (1.0 + housing_.gain_error);
 }
 
 /// P = F P F' + Q with F = [phi0, phi1 d(rate)/d(ambient, parameters); 0, 1], and the sensor's lag as a row of its own.
@@ -244,9 +251,8 @@ void CoreEstimator::hear_housing(Reading housing) {
   read_ = true;
   if (!acquired_) {
     // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
-    if (!ambient_known_ && static_cast<double>(reading_degC) < ambient_degC_) {
-      ambient_degC_ = static_cast<double>(reading_degC > 20.0f ? reading_degC : 20.0f);
-    }
+    const double read_degC = housing_of_degC(static_cast<double>(reading_degC));
+    if (!ambient_known_ && read_degC < ambient_degC_) ambient_degC_ = read_degC > 20.0 ? read_degC : 20.0;
   }
   reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
   reading_moved_K_ = reading_degC - reading_slow_degC_;
@@ -262,7 +268,7 @@ void CoreEstimator::meet_sensor(float reading_degC) {
   late_shared_K_[sensor()] = 0.0f;
   late_K_ = 0.0;
   p_(sensor(), sensor()) = squared(settings_.housing_noise_K);
-  raise_to(reading_degC);
+  raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
 void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
@@ -276,7 +282,8 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
     const int h = housing_.node;
     acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K);
     trusted_ambient_degC_ = ambient_degC_;
-    raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
+    // After a reset the winding does not follow the housing by itself.
+    raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
@@ -359,7 +366,7 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_) gain[ambient()] = 0.0f;
+  if (ambient_known_ || (!acquired_ && innovation_K < 0.0f)) gain[ambient()] = 0.0f;  // the first reading did that
   const float down_K = down_by(gain, innovation_K);
   if (down_K > most_down_K) gain *= most_down_K / down_K;
   if (std::isfinite(most_down_K)) {
@@ -504,7 +511,7 @@ double CoreEstimator::hottest_limit_degC() const {
 /// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of how
 /// fast they warm (the worst case: the next burst adds to it), and for one that the housing does not show.
 void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
-  sensor_degC_ = degC_[housing_.node];
+  sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
@@ -551,7 +558,7 @@ void CoreEstimator::guard_state() {
     degC_[i] = !(degC_[i] <= coldest_degC) && std::isfinite(limit) && limit > hotter ? limit : hotter;
   }
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
-  sensor_degC_ = degC_[housing_.node];
+  sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   model_moved_K_ = 0.0f;
   late_K_ = 0.0;

@@ -134,6 +134,8 @@ class CoreEstimator {
   void hear_housing(Reading housing);
   void correct_by_housing(float reading_degC, float innovation_K, bool first);
   void meet_sensor(float reading_degC);
+  double sensed_degC(double housing_degC) const;
+  double housing_of_degC(double sensed_degC) const;
   void disbelieve_housing();
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -144,6 +145,19 @@ TEST(Estimator, FindsAnAmbientItWasNotTold) {
     EXPECT_NEAR(bench.core_error_K(), 0.0, 2.5) << ambient;
     EXPECT_NEAR(bench.core.estimate().ambient_degC, ambient, 6.0);
     EXPECT_FALSE(bench.flag(thermal::housing_contradicts));
+  }
+}
+
+TEST(Estimator, AHousingThatFollowsItsAmbientAtOnceTeachesItOnce) {
+  const wire::Motor cooled = reference::motor(2.7, 4.5, 0.001, 0.5, 0.05);  // 50 ms from ambient to housing
+  for (double ambient : {-4.0, 23.0}) {
+    EstimatorSettings s = with(thermal::exact_trust);
+    s.ambient_sigma_K = 30;
+    Bench bench(cooled, s, ambient);
+    bench.run(1, 0);
+    EXPECT_GT(bench.core.estimate().ambient_degC, ambient - 0.5);
+    bench.run(2, 10);
+    EXPECT_GT(bench.core_error_K(), -1.0) << ambient;
   }
 }
 
@@ -447,6 +461,36 @@ TEST(Estimator, AHotReadingAlwaysRaises) {
   const double before = bench.core.estimate().hottest_degC();
   bench.run(30, 2, [&] { return Reading{static_cast<float>(bench.plant.degC[1]) + 30.0f, true}; });
   EXPECT_GT(bench.core.estimate().hottest_degC(), before + 15);
+}
+
+TEST(Estimator, WhatASensorIsToldToMisreadIsTakenOffWhereverItIsHeard) {
+  // Soaked as believed; then a start that remembers a cold motor, whose housing is at 90 degC.
+  const auto heard = [](double offset_K, double gain_error, double lag_s) {
+    thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+    set.housing.offset_K = offset_K, set.housing.gain_error = gain_error, set.housing.lag_s = lag_s;
+    const auto reads = [&](double degC) {
+      return Reading{static_cast<float>(degC + gain_error * (degC - 25) + offset_K), true};
+    };
+    CoreEstimator soaked(set, with(thermal::identified_trust)), restored(set, with(thermal::identified_trust));
+    double coldest_degC = 1e9;
+    for (int i = 0; i < 2000; ++i) {
+      soaked.tick({}, reads(40));
+      coldest_degC = std::min(coldest_degC, soaked.estimate().hottest_degC());
+    }
+    restored.restore({4, {25, 25, 25, 25}, {5, 5, 5, 5}, 25}, nan);
+    for (int i = 0; i < 60; ++i) restored.tick({}, reads(90));
+    return std::array{coldest_degC, soaked.estimate().ambient_degC, restored.estimate().hottest_degC()};
+  };
+  for (const double lag_s : {0.0, 100.0}) {
+    const auto right = heard(0, 0, lag_s);
+    for (const double offset_K : {-20.0, 20.0}) {
+      for (const double gain_error : {-0.3, 0.3}) {
+        const auto misread = heard(offset_K, gain_error, lag_s);
+        for (std::size_t k = 0; k < right.size(); ++k)
+          EXPECT_NEAR(misread[k], right[k], 0.5) << k << ": " << offset_K << " K, " << gain_error << ", " << lag_s;
+      }
+    }
+  }
 }
 
 TEST(Estimator, AGlitchUpwardsIsForgottenAndAHousingThatStaysHotIsFollowed) {
