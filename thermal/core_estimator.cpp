@@ -81,7 +81,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   sensor_degC_ = sensed_degC(ambient_degC_);
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
   const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
   late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
@@ -345,6 +345,7 @@ void CoreEstimator::settle(int steps) {
   ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
   sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
   due_K_ *= 1.0f - part;
+  due_margin_K_ *= 1.0f - part;
   due_steps_ -= steps;
 }
 
@@ -380,9 +381,7 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   }
 
   settle(due_steps_);
-  due_K_ = gain * innovation_K;
-  due_steps_ = over_steps;
-  if (over_steps == 1) settle(1);
+  due_margin_K_ = margins_K();
   const Covariance keep = Covariance::Identity(n_ + 5, n_ + 5) - gain.lazyProduct(seen.transpose());
   const Covariance half = keep.lazyProduct(p_);
   p_ = half.lazyProduct(keep.transpose());
@@ -390,7 +389,18 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   // Raised, a state is no colder than it was: what a lag may hide grows only when a reading lowers.
   if (!raises) late_shared_K_ = (keep.lazyProduct(late_shared_K_) + gain * late_K).eval();
   p_ = ((p_ + p_.transpose()) * 0.5f).eval();
+  due_K_ = gain * innovation_K;
+  due_margin_K_ -= margins_K();
+  due_steps_ = over_steps;
+  if (over_steps == 1) settle(1);
   return true;
+}
+
+/// k sigma of each node.
+CoreEstimator::Row CoreEstimator::margins_K() const {
+  Row margins = Row::Zero(n_ + 5);
+  for (int i = 0; i < n_; ++i) margins[i] = settings_.margin_sigmas * std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
+  return margins;
 }
 
 void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC,
@@ -519,7 +529,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
@@ -563,7 +573,7 @@ void CoreEstimator::guard_state() {
   model_moved_K_ = 0.0f;
   late_K_ = 0.0;
   due_steps_ = 0;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   good_degC_ = degC_;
 }
 
@@ -574,7 +584,8 @@ void CoreEstimator::publish() {
     estimate_.sigma_K[i] = std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
-                                   : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i];
+                                   : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
+                                         std::fmax(due_margin_K_[i], 0.0f);
     estimate_.max_degC[i] = max_degC_[i];
   }
   estimate_.housing_degC = degC_[housing_.node];

@@ -186,6 +186,26 @@ TEST(Estimator, SigmaGrowsWithLoadAndCoversASheetThatIsWrong) {
   }
 }
 
+TEST(Estimator, AMarginShrinksNoSoonerThanItsCorrectionFlowsIn) {
+  // A housing as light as its winding tells much about it, in readings half a second apart.
+  const wire::Motor sheet = reference::motor(0.05, 3.7, 100, 0.5, 10);
+  wire::Motor real = sheet;
+  real.C1_J_per_K *= 0.8;
+  Bench bench(real, with({0.3f, 0.02f, 0.0f}), 40, sheet);
+  bench.run(2, 0);
+  double colder_K = 0, fall_K = 0;
+  float last_degC = 0;
+  for (int i = 0; i < 300; ++i) {
+    bench.run(0.01, 350);
+    const float margin_degC = bench.core.estimate().hottest_margin_degC();
+    colder_K = std::max(colder_K, static_cast<double>(bench.plant.degC[0]) - static_cast<double>(margin_degC));
+    fall_K = std::max(fall_K, static_cast<double>(last_degC - margin_degC));
+    last_degC = margin_degC;
+  }
+  EXPECT_LT(colder_K, 1.0) << "of the truth";
+  EXPECT_LT(fall_K, 2.0) << "in 10 ms, while it is heated";
+}
+
 TEST(Estimator, SigmaOfErrorsThatGoTogetherIsTheSpreadOfSuchMotors) {
   // R1 C1 is known to 3 %, each alone to 9 %: C1 too small and R1 too large, as a fit leaves them.
   constexpr double tau_sd = 0.03, alone_sd = 0.09;
