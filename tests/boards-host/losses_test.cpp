@@ -65,9 +65,10 @@ TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
   EXPECT_GT(hidden, 0.3) << "nothing was hidden, so nothing was shown";
 }
 
-/// A motor driven at a speed, its current reversed for the last tenth of each 10 ms, `lead_ms` before the slow lane
-/// looks: what the firmware counted of the true heat.
-double counted_share(int lead_ms) {
+/// A motor driven at a speed, asked for a current at each millisecond, of which the slow lane looks at each tenth: what
+/// the firmware counted of the true heat.
+template <class Asked>
+double counted_share(double emf_V, Asked asked_A) {
   wire::Motor motor = plant_tests::small_motor();
   motor.copper_coefficient_per_K = 0;  // or heat would not be A^2 s
   host_sim::BenchDesign design = plant_tests::bench_design(motor);
@@ -79,13 +80,12 @@ double counted_share(int lead_ms) {
   std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
                                                  boards::host::AxisDoor(bench, design.sensors, 1)};
   bench.load(0).mode = host_sim::Load::Mode::imposed_speed;
-  bench.load(0).speed_rad_per_s = 10 / motor.pole_pairs / motor.flux_linkage_Wb;  // half of what 48 V reach
-  const float current_A = static_cast<float>(1.3 * motor.rated_current_A);
   constexpr int armed_ms = 200, from_ms = 400, to_ms = 1000;
   double counted_A2s = 0, before_J = 0;
   for (int ms = 0; ms < to_ms; ++ms) {
     if (ms == armed_ms) (void)driver.axis(0).arm();
-    if (ms > armed_ms) (void)driver.axis(0).set_current({0.0f, (ms + lead_ms) % 10 < 9 ? current_A : -current_A});
+    if (ms > armed_ms) (void)driver.axis(0).set_current(asked_A(ms));
+    if (ms == armed_ms) bench.load(0).speed_rad_per_s = emf_V / motor.pole_pairs / motor.flux_linkage_Wb;
     if (ms == from_ms) before_J = bench.energy().copper_J;
     for (int period = 0; period < 20; ++period) {
       const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
@@ -104,10 +104,22 @@ double counted_share(int lead_ms) {
   return counted_A2s * 1.5 * motor.phase_resistance_ohm / (bench.energy().copper_J - before_J);
 }
 
+const float small_A = static_cast<float>(1.3 * plant_tests::small_motor().rated_current_A);
+
 TEST(Losses, ADemandInStepWithTheSlowLaneHidesNoHeat) {
   for (int lead_ms = 0; lead_ms < 10; ++lead_ms) {
-    const double share = counted_share(lead_ms);
+    // Reversed for a tenth of the time; 10 V is half of what 48 V reach.
+    const double share = counted_share(10, [&](int ms) {
+      return wire::Dq{0.0f, (ms + lead_ms) % 10 < 9 ? small_A : -small_A};
+    });
     EXPECT_TRUE(share > 0.99 && share < 1.02) << share << " where it turns " << lead_ms << " ms before";
+  }
+}
+
+TEST(Losses, WhatTheMagnetBendsBetweenTwoSamplesCountsWithItsSign) {
+  for (const float d_A : {-2 * small_A, 2 * small_A}) {
+    const double share = counted_share(15, [&](int) { return wire::Dq{d_A, 0.0f}; });
+    EXPECT_TRUE(share > 0.99 && share < 1.02) << share << " with " << d_A << " A along the magnet";
   }
 }
 

@@ -537,6 +537,21 @@ TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
   }
 }
 
+TEST(Estimator, ASpeedThatIsNotANumberCountsForMoreEachTime) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  HeatInput<> input;
+  input[Drive::speed_rad_per_s] = 100;
+  core.tick(input, at_25);
+  input[Drive::speed_rad_per_s] = nan;
+  double last = 100;
+  for (int i = 0; i < 100; ++i) {
+    core.tick(input, at_25);
+    ASSERT_GE(core.input()[Drive::speed_rad_per_s], last);
+    last = core.input()[Drive::speed_rad_per_s];
+  }
+  EXPECT_EQ(last, 1e4);
+}
+
 TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
   CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
   for (int i = 0; i < 7; ++i) whole.tick(current(100), missing);
@@ -606,6 +621,14 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
   EXPECT_NEAR(after(1e5), 40.0, 0.01);
   memory.degC[0] = std::nanf("");
   EXPECT_NEAR(after(nan), 155.0, 1e-3) << "a torn record counts as a motor at its limit";
+}
+
+TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
+  wire::Motor cool = reference::ec16();
+  cool.winding_max_degC = 45;
+  CoreEstimator core(thermal::three_phase_set(cool), {});
+  core.start_hot();
+  EXPECT_GE(core.estimate().hottest_degC(), 40.0) << "10 K below the limit would be 35";
 }
 
 TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
