@@ -637,20 +637,25 @@ TEST(Driver, TheSharedPowerStageHoldsBothBack) {
 }
 
 TEST(Driver, AnAxisGetsOfThePowerStageWhatTheOtherLeaves) {
-  firmware::Driver driver(bench::driver_setup());
-  bench::Motor motors[2];
-  const float asked_A[2] = {6.0f, 1.0f};
-  for (int i = 0; i < 3 * 20000; ++i) {
-    for (int k = 0; k < 2; ++k) {
-      motors[k].run(driver.axis(k).tick(motors[k].sample()));
-      if (i == 2500) (void)driver.axis(k).arm();
-      if (i > 2500 && i % 100 == 0) (void)driver.axis(k).set_current({0.0f, asked_A[k]});
+  for (const float continuous_A : {6.0f, 8.0f}) {
+    firmware::DriverSetup setup = bench::driver_setup();
+    setup.rating.continuous_A = continuous_A;
+    firmware::Driver driver(setup);
+    bench::Motor motors[2];
+    const float asked_A[2] = {6.0f, 1.0f};
+    for (int i = 0; i < 3 * 20000; ++i) {
+      for (int k = 0; k < 2; ++k) {
+        motors[k].run(driver.axis(k).tick(motors[k].sample()));
+        if (i == 2500) (void)driver.axis(k).arm();
+        if (i > 2500 && i % 100 == 0) (void)driver.axis(k).set_current({0.0f, asked_A[k]});
+      }
+      // The stage's own sensor says that it is at its limit.
+      if (i % 200 == 199) driver.slow_tick({{100.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
     }
-    // The stage's own sensor says that it is at its limit.
-    if (i % 200 == 199) driver.slow_tick({{100.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    const float all_A2 = continuous_A * continuous_A;
+    EXPECT_NEAR(driver.axis(0).state().allowance_A, std::sqrt(all_A2 - 1.0f), 0.1f);
+    EXPECT_NEAR(driver.axis(1).state().allowance_A, std::sqrt(0.5f * all_A2), 0.1f) << "half, whatever the other takes";
   }
-  EXPECT_NEAR(driver.axis(0).state().allowance_A, std::sqrt(36.0f - 1.0f), 0.1f);
-  EXPECT_NEAR(driver.axis(1).state().allowance_A, std::sqrt(18.0f), 0.1f) << "half of it, whatever the other takes";
 }
 
 // ---- heat -----------------------------------------------------------------------------------------------------------
@@ -752,6 +757,18 @@ std::unique_ptr<firmware::Driver> after_current(int every, const hal::AxisSample
     if (i % every == 0) driver.slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
   }
   return out;
+}
+
+TEST_F(Running, TimeWithoutSamplesIsTimeAllTheSame) {
+  hold({0.0f, 5.0f}, 200 - ticks % 200);
+  int steps = 0;
+  for (int i = 0; i < 20; ++i) {
+    motor.sequence += 190;  // of 390 periods
+    hold({0.0f, 5.0f}, 200);
+    steps += axis().elapsed_steps();
+  }
+  EXPECT_EQ(axis().mode(), Mode::running);
+  EXPECT_NEAR(steps, 39, 1);
 }
 
 TEST(Axis, ASlowLaneThatIsLateLosesNoTime) {

@@ -75,6 +75,15 @@ TEST(Parameters, APhaseIsAsFastAsItsTwoNeighboursAndItsThirdOfR1MakeIt) {
   EXPECT_EQ(validate(p).id, 0x0207);
 }
 
+TEST(Parameters, AnAmbientThatLeavesAWindingNothingIsRefused) {
+  firmware::HeatParameters p = firmware::heat_parameters_from(bench::motor(), thermal::sheet_trust);
+  p.winding_max_degC = 60;
+  p.ambient_degC = 59;
+  EXPECT_EQ(validate(p).id, 0);
+  p.ambient_degC = 60;
+  EXPECT_EQ(validate(p).id, 0x020C);
+}
+
 TEST(Parameters, EachThermalParameterArrivesWhereItCounts) {
   firmware::HeatParameters p = firmware::heat_parameters_from(bench::motor(), {0.11f, 0.12f, 0.13f});
   p.margin_sigmas_count = 3, p.ambient_degC = 35, p.ambient_sigma_K = 6, p.housing_noise_K = 0.7f;
