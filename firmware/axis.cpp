@@ -330,6 +330,9 @@ void Axis::watch() {
                             trace_.bus_V,   trace_.share,     mode_ == Mode::running};
   std::atomic_signal_fence(std::memory_order_seq_cst);
   if (heat_.adding().periods != before || commands_.load() != 0) return;
+  const thermal::Unseen now = look.switches ? unseen_now() : thermal::Unseen{};
+  looked_ = {looked_.of_mean_A2 + now.of_mean_A2, looked_.of_heat_A2 + now.of_heat_A2};
+  ++looks_;
   const FaultRecord found = watch_.judge(look, {warm_ohm(), inductance_H_, flux_Wb_});
   if (found.fault == wire::Fault::none) return;
   doubted_ = found;
@@ -342,7 +345,7 @@ float Axis::warm_ohm() const {
   return phase_ohm_ * (1.0f + copper_per_K_ * warm_K);
 }
 
-/// Squared current that the samples of the last step did not show, from the last of them.
+/// Squared current that the last sample did not show.
 thermal::Unseen Axis::unseen_now() const {
   const float phase_ohm = warm_ohm();
   const float turn_rad = rotor_.electrical_rad_per_s() * period_s_;
@@ -356,6 +359,17 @@ thermal::Unseen Axis::unseen_now() const {
                       phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
                       {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
   return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
+}
+
+/// The same of the last step, the mean of its looks: one alone would hide up to a seventh of the heat of a demand that
+/// goes in step with the slow lane (losses_test). Without a look, as of the last sample.
+thermal::Unseen Axis::take_unseen() {
+  const float share = looks_ > 0 ? 1.0f / static_cast<float>(looks_) : 0.0f;
+  thermal::Unseen mean = {looked_.of_mean_A2 * share, looked_.of_heat_A2 * share};
+  if (looks_ == 0 && mode_ == Mode::running) mean = unseen_now();
+  looked_ = {};
+  looks_ = 0;
+  return mean;
 }
 
 /// Three currents of a star have no sum, so where they have one a sensor lies, and nobody knows which: each phase as
@@ -372,17 +386,18 @@ void Axis::add_contradicted(float (&phase_A2)[3]) const {
   }
 }
 
-/// Means over the step; speed, bus and mode are taken as they stand. No sample at all: what went
+/// Means over the step; speed and mode are taken as they stand. No sample at all: what went
 /// on before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
+  const thermal::Unseen looked = take_unseen();
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
     unseen_ = {};
   } else {
     const float share = 1.0f / static_cast<float>(sums.periods);
     const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
-    unseen_ = mode_ == Mode::running ? unseen_now() : thermal::Unseen{};
+    unseen_ = looked;
     float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
     add_contradicted(phase_A2);
     // What a sample misses of the mean goes with the phase's own current, ripple through all of them.

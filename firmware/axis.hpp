@@ -116,7 +116,8 @@ class Axis {
 
   /// Every 10 ms, from one context below the control interrupt. `board`: what the shared power stage leaves this axis.
   void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board);
-  /// Every millisecond, from the same context: what no single sample shows. Not twice on one sample.
+  /// Every millisecond, from the same context: what no single sample shows, of faults and of heat. Not twice on one
+  /// sample.
   void watch();
 
   /// Current command, amperes of phase amplitude (id, iq); keeps the axis alive for setpoint_timeout_s. Wakes an armed
@@ -185,6 +186,7 @@ class Axis {
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   thermal::Unseen unseen_now() const;
+  thermal::Unseen take_unseen();
   float warm_ohm() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
@@ -245,6 +247,8 @@ class Axis {
   // Slow lane, in the order of the walk.
   thermal::CoreEstimator core_;
   thermal::Governor governor_;
+  thermal::Unseen looked_{};  // sum over `looks_`, since the last slow tick
+  int looks_ = 0;
   thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
   float owed_steps_ = 0.0f;       // time that is not yet a whole one

@@ -78,10 +78,10 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   degC_ = Vector::Constant(n_, ambient_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  sensor_degC_ = ambient_degC_;
+  sensor_degC_ = sensed_degC(ambient_degC_);
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
   const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
   late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
@@ -160,11 +160,18 @@ void CoreEstimator::step() {
   input_[Boundary::ambient] = ambient_degC_;
   propagate_covariance(network_.rates(degC_, input_));
   degC_ = network_.step(transition_, degC_, input_);
-  const double target =
-      degC_[housing_.node] * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
+  const double target = sensed_degC(degC_[housing_.node]);
   const double moved_K = (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
   late_K_ += moved_K - late_take_ * (target - sensor_degC_ + late_K_);
   sensor_degC_ += moved_K;
+}
+
+/// What the sensor reads of a housing that has been as warm as this for long, and the other way round.
+double CoreEstimator::sensed_degC(double housing_degC) const {
+  return housing_degC * (1.0 + housing_.gain_error) - 25.0 * housing_.gain_error + housing_.offset_K;
+}
+double CoreEstimator::housing_of_degC(double sensed_degC) const {
+  return (sensed_degC + 25.0 * housing_.gain_error - housing_.offset_K) / (1.0 + housing_.gain_error);
 }
 
 /// P = F P F' + Q with F = [phi0, phi1 d(rate)/d(ambient, parameters); 0, 1], and the sensor's lag as a row of its own.
@@ -244,9 +251,8 @@ void CoreEstimator::hear_housing(Reading housing) {
   read_ = true;
   if (!acquired_) {
     // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
-    if (!ambient_known_ && static_cast<double>(reading_degC) < ambient_degC_) {
-      ambient_degC_ = static_cast<double>(reading_degC > 20.0f ? reading_degC : 20.0f);
-    }
+    const double read_degC = housing_of_degC(static_cast<double>(reading_degC));
+    if (!ambient_known_ && read_degC < ambient_degC_) ambient_degC_ = read_degC > 20.0 ? read_degC : 20.0;
   }
   reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
   reading_moved_K_ = reading_degC - reading_slow_degC_;
@@ -262,7 +268,7 @@ void CoreEstimator::meet_sensor(float reading_degC) {
   late_shared_K_[sensor()] = 0.0f;
   late_K_ = 0.0;
   p_(sensor(), sensor()) = squared(settings_.housing_noise_K);
-  raise_to(reading_degC);
+  raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
 void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
@@ -276,7 +282,8 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
     const int h = housing_.node;
     acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K);
     trusted_ambient_degC_ = ambient_degC_;
-    raise_to(reading_degC);  // after a reset the winding does not follow the housing by itself
+    // After a reset the winding does not follow the housing by itself.
+    raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
@@ -338,6 +345,7 @@ void CoreEstimator::settle(int steps) {
   ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
   sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
   due_K_ *= 1.0f - part;
+  due_margin_K_ *= 1.0f - part;
   due_steps_ -= steps;
 }
 
@@ -359,7 +367,7 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_) gain[ambient()] = 0.0f;
+  if (ambient_known_ || (!acquired_ && innovation_K < 0.0f)) gain[ambient()] = 0.0f;  // the first reading did that
   const float down_K = down_by(gain, innovation_K);
   if (down_K > most_down_K) gain *= most_down_K / down_K;
   if (std::isfinite(most_down_K)) {
@@ -373,9 +381,7 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   }
 
   settle(due_steps_);
-  due_K_ = gain * innovation_K;
-  due_steps_ = over_steps;
-  if (over_steps == 1) settle(1);
+  due_margin_K_ = margins_K();
   const Covariance keep = Covariance::Identity(n_ + 5, n_ + 5) - gain.lazyProduct(seen.transpose());
   const Covariance half = keep.lazyProduct(p_);
   p_ = half.lazyProduct(keep.transpose());
@@ -383,7 +389,18 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   // Raised, a state is no colder than it was: what a lag may hide grows only when a reading lowers.
   if (!raises) late_shared_K_ = (keep.lazyProduct(late_shared_K_) + gain * late_K).eval();
   p_ = ((p_ + p_.transpose()) * 0.5f).eval();
+  due_K_ = gain * innovation_K;
+  due_margin_K_ -= margins_K();
+  due_steps_ = over_steps;
+  if (over_steps == 1) settle(1);
   return true;
+}
+
+/// k sigma of each node.
+CoreEstimator::Row CoreEstimator::margins_K() const {
+  Row margins = Row::Zero(n_ + 5);
+  for (int i = 0; i < n_; ++i) margins[i] = settings_.margin_sigmas * std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
+  return margins;
 }
 
 void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC,
@@ -504,7 +521,7 @@ double CoreEstimator::hottest_limit_degC() const {
 /// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of how
 /// fast they warm (the worst case: the next burst adds to it), and for one that the housing does not show.
 void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
-  sensor_degC_ = degC_[housing_.node];
+  sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
@@ -512,7 +529,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
@@ -551,12 +568,12 @@ void CoreEstimator::guard_state() {
     degC_[i] = !(degC_[i] <= coldest_degC) && std::isfinite(limit) && limit > hotter ? limit : hotter;
   }
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
-  sensor_degC_ = degC_[housing_.node];
+  sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   model_moved_K_ = 0.0f;
   late_K_ = 0.0;
   due_steps_ = 0;
-  due_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
   good_degC_ = degC_;
 }
 
@@ -567,7 +584,8 @@ void CoreEstimator::publish() {
     estimate_.sigma_K[i] = std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
-                                   : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i];
+                                   : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
+                                         std::fmax(due_margin_K_[i], 0.0f);
     estimate_.max_degC[i] = max_degC_[i];
   }
   estimate_.housing_degC = degC_[housing_.node];

@@ -134,7 +134,10 @@ class CoreEstimator {
   void hear_housing(Reading housing);
   void correct_by_housing(float reading_degC, float innovation_K, bool first);
   void meet_sensor(float reading_degC);
+  double sensed_degC(double housing_degC) const;
+  double housing_of_degC(double sensed_degC) const;
   void disbelieve_housing();
+  Row margins_K() const;
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
   void settle(int steps);
@@ -161,7 +164,8 @@ class CoreEstimator {
   Row late_shared_K_;       // how much colder the states were made, per sigma of it
   double late_K_ = 0.0;     // how much less a sensor reads that lags by one sigma more
   double late_take_ = 1.0;  // share of its way that such a sensor goes in a step
-  Row due_K_;               // what the last correction has yet to add, in due_steps_ steps
+  Row due_K_;               // what the last correction has yet to add, in due_steps_ steps,
+  Row due_margin_K_;        // and what it has yet to take from the margins: surer at once, they would be colder at once
   int due_steps_ = 0;
   HeatInput<> input_;
 

@@ -6,7 +6,11 @@
 
 #include <algorithm>
 
+#include "boards/dual_48v_20a.hpp"
+#include "boards/host/board.hpp"
+#include "firmware/driver.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
+#include "thermal/motor_set.hpp"
 
 namespace {
 
@@ -59,6 +63,64 @@ TEST(Losses, WhatSamplesHideOfTheHeatIsKnownFromTheDuty) {
       "  samples alone miss up to %.0f %% of the heat; with the firmware's account %+.1f to %+.1f %% are left\n",
       100 * hidden, 100 * (least - 1), 100 * (most - 1));
   EXPECT_GT(hidden, 0.3) << "nothing was hidden, so nothing was shown";
+}
+
+/// A motor driven at a speed, asked for a current at each millisecond, of which the slow lane looks at each tenth: what
+/// the firmware counted of the true heat.
+template <class Asked>
+double counted_share(double emf_V, Asked asked_A) {
+  wire::Motor motor = plant_tests::small_motor();
+  motor.copper_coefficient_per_K = 0;  // or heat would not be A^2 s
+  host_sim::BenchDesign design = plant_tests::bench_design(motor);
+  design.supply.can_sink = true;
+  host_sim::Bench bench(design, 1);
+  const firmware::AxisSetup axis = {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
+                                    thermal::three_phase_set(motor)};
+  firmware::Driver driver({boards::dual_48V_20A, {axis, axis}});
+  std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
+                                                 boards::host::AxisDoor(bench, design.sensors, 1)};
+  bench.load(0).mode = host_sim::Load::Mode::imposed_speed;
+  constexpr int armed_ms = 200, from_ms = 400, to_ms = 1000;
+  double counted_A2s = 0, before_J = 0;
+  for (int ms = 0; ms < to_ms; ++ms) {
+    if (ms == armed_ms) (void)driver.axis(0).arm();
+    if (ms > armed_ms) (void)driver.axis(0).set_current(asked_A(ms));
+    if (ms == armed_ms) bench.load(0).speed_rad_per_s = emf_V / motor.pole_pairs / motor.flux_linkage_Wb;
+    if (ms == from_ms) before_J = bench.energy().copper_J;
+    for (int period = 0; period < 20; ++period) {
+      const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
+      for (int i = 0; i < 2; ++i)
+        doors[static_cast<std::size_t>(i)].drive(driver.axis(i).tick(doors[static_cast<std::size_t>(i)].sample()));
+      bench.advance_period(duty);
+    }
+    driver.watch();
+    if (ms % 10 != 9) continue;
+    driver.slow_tick(boards::host::slow_sample(bench.board_raw(), design.sensors),
+                     {boards::host::slow_sample(bench.raw(0), design.sensors),
+                      boards::host::slow_sample(bench.raw(1), design.sensors)});
+    if (ms > from_ms) counted_A2s += driver.axis(0).current2_A2() * 0.01;
+  }
+  EXPECT_EQ(driver.axis(0).mode(), firmware::Mode::running);
+  return counted_A2s * 1.5 * motor.phase_resistance_ohm / (bench.energy().copper_J - before_J);
+}
+
+const float small_A = static_cast<float>(1.3 * plant_tests::small_motor().rated_current_A);
+
+TEST(Losses, ADemandInStepWithTheSlowLaneHidesNoHeat) {
+  for (int lead_ms = 0; lead_ms < 10; ++lead_ms) {
+    // Reversed for a tenth of the time; 10 V is half of what 48 V reach.
+    const double share = counted_share(10, [&](int ms) {
+      return wire::Dq{0.0f, (ms + lead_ms) % 10 < 9 ? small_A : -small_A};
+    });
+    EXPECT_TRUE(share > 0.99 && share < 1.02) << share << " where it turns " << lead_ms << " ms before";
+  }
+}
+
+TEST(Losses, WhatTheMagnetBendsBetweenTwoSamplesCountsWithItsSign) {
+  for (const float d_A : {-2 * small_A, 2 * small_A}) {
+    const double share = counted_share(15, [&](int) { return wire::Dq{d_A, 0.0f}; });
+    EXPECT_TRUE(share > 0.99 && share < 1.02) << share << " with " << d_A << " A along the magnet";
+  }
 }
 
 }  // namespace

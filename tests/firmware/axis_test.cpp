@@ -636,6 +636,28 @@ TEST(Driver, TheSharedPowerStageHoldsBothBack) {
   }
 }
 
+TEST(Driver, AnAxisGetsOfThePowerStageWhatTheOtherLeaves) {
+  for (const float continuous_A : {6.0f, 8.0f}) {
+    firmware::DriverSetup setup = bench::driver_setup();
+    setup.rating.continuous_A = continuous_A;
+    firmware::Driver driver(setup);
+    bench::Motor motors[2];
+    const float asked_A[2] = {6.0f, 1.0f};
+    for (int i = 0; i < 3 * 20000; ++i) {
+      for (int k = 0; k < 2; ++k) {
+        motors[k].run(driver.axis(k).tick(motors[k].sample()));
+        if (i == 2500) (void)driver.axis(k).arm();
+        if (i > 2500 && i % 100 == 0) (void)driver.axis(k).set_current({0.0f, asked_A[k]});
+      }
+      // The stage's own sensor says that it is at its limit.
+      if (i % 200 == 199) driver.slow_tick({{100.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    }
+    const float all_A2 = continuous_A * continuous_A;
+    EXPECT_NEAR(driver.axis(0).state().allowance_A, std::sqrt(all_A2 - 1.0f), 0.1f);
+    EXPECT_NEAR(driver.axis(1).state().allowance_A, std::sqrt(0.5f * all_A2), 0.1f) << "half, whatever the other takes";
+  }
+}
+
 // ---- heat -----------------------------------------------------------------------------------------------------------
 
 TEST_F(Running, TheSlowLaneGetsTheSquareOfTheCurrent) {
@@ -651,6 +673,52 @@ TEST_F(Running, RippleHeatsAndRubsNothing) {
   EXPECT_NEAR(heat[thermal::Drive::current_A], 5.0, 0.1);
   EXPECT_NEAR(heat[thermal::Drive::current_speed], 5.0 * 400, 0.1 * 400);
   EXPECT_GT(heat[thermal::Drive::current_A2], 25.0 + 1.0);
+}
+
+TEST(Axis, RippleIsThatOfTheMeanOfBothInductances) {
+  const auto ripple_A2 = [](double d_H, double q_H) {
+    firmware::DriverSetup setup = bench::driver_setup();
+    setup.axes[0].parameters.inductance_d_H = static_cast<float>(d_H);
+    setup.axes[0].parameters.inductance_q_H = static_cast<float>(q_H);
+    Rig rig(setup);
+    rig.motor.sheet.inductance_d_H = d_H, rig.motor.sheet.inductance_q_H = q_H;
+    rig.bring_up();
+    rig.motor.rad_per_s = 400;
+    rig.hold({0.0f, 5.0f}, 4000);
+    return rig.axis().state().unseen.of_heat_A2 - rig.axis().state().unseen.of_mean_A2;
+  };
+  const float wide_d = ripple_A2(50e-6, 20e-6), wide_q = ripple_A2(20e-6, 50e-6);
+  EXPECT_GT(wide_d, 1.0f);
+  EXPECT_NEAR(wide_d, wide_q, 0.1f * wide_q);
+}
+
+TEST(Axis, WhileItOnlyWaitsTurningIsNoHeat) {
+  Rig rig;
+  rig.bring_up();
+  rig.motor.rad_per_s = 400;
+  rig.run(2000);
+  ASSERT_EQ(rig.axis().mode(), Mode::ready);
+  EXPECT_EQ(rig.axis().state().unseen.of_heat_A2, 0.0f);
+}
+
+TEST(Axis, AnotherSetAllowsNothingBeforeTheSlowLaneHasSeenIt) {
+  Rig rig;
+  rig.bring_up();
+  rig.axis().disarm();
+  rig.run(200);
+  ASSERT_GT(rig.axis().state().allowance_A, 10.0f);
+  rig.slow_lane_alive = false;
+  for (const firmware::HeatModel heat : {firmware::HeatModel::unchanged, firmware::HeatModel::changed}) {
+    rig.driver.configure(0, bench::axis_setup(), heat);
+    rig.run(2400);
+    ASSERT_EQ(rig.axis().arm(), Status::done);
+    rig.run(1);
+    rig.hold({0.0f, 5.0f}, 200);
+    ASSERT_EQ(rig.axis().mode(), Mode::running);
+    EXPECT_EQ(rig.axis().fast().permitted_A.q, 0.0f);
+    rig.axis().disarm();
+    rig.run(1);
+  }
 }
 
 TEST_F(Running, OnceStoppedForWantOfSamplesItShowsNoCurrent) {
@@ -689,6 +757,18 @@ std::unique_ptr<firmware::Driver> after_current(int every, const hal::AxisSample
     if (i % every == 0) driver.slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
   }
   return out;
+}
+
+TEST_F(Running, TimeWithoutSamplesIsTimeAllTheSame) {
+  hold({0.0f, 5.0f}, 200 - ticks % 200);
+  int steps = 0;
+  for (int i = 0; i < 20; ++i) {
+    motor.sequence += 190;  // of 390 periods
+    hold({0.0f, 5.0f}, 200);
+    steps += axis().elapsed_steps();
+  }
+  EXPECT_EQ(axis().mode(), Mode::running);
+  EXPECT_NEAR(steps, 39, 1);
 }
 
 TEST(Axis, ASlowLaneThatIsLateLosesNoTime) {

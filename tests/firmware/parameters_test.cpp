@@ -66,6 +66,41 @@ TEST(Parameters, AWindingThatIsTooFastForTheSlowLaneIsRefused) {
   EXPECT_EQ(validate(fast).id, 0x0207);
 }
 
+TEST(Parameters, APhaseIsAsFastAsItsTwoNeighboursAndItsThirdOfR1MakeIt) {
+  firmware::HeatParameters p = firmware::heat_parameters_from(bench::motor(), thermal::sheet_trust);
+  const float own_W_per_K = 1.0f / (3.0f * p.R1_K_per_W), bound_W_per_K = p.C1_J_per_K / 3.0f / 0.05f;  // at 50 ms
+  p.phase_coupling_W_per_K = 0.99f * 0.5f * (bound_W_per_K - own_W_per_K);
+  EXPECT_EQ(validate(p).id, 0);
+  p.phase_coupling_W_per_K = 1.01f * 0.5f * (bound_W_per_K - own_W_per_K);
+  EXPECT_EQ(validate(p).id, 0x0207);
+}
+
+TEST(Parameters, AnAmbientThatLeavesAWindingNothingIsRefused) {
+  firmware::HeatParameters p = firmware::heat_parameters_from(bench::motor(), thermal::sheet_trust);
+  p.winding_max_degC = 60;
+  p.ambient_degC = 59;
+  EXPECT_EQ(validate(p).id, 0);
+  p.ambient_degC = 60;
+  EXPECT_EQ(validate(p).id, 0x020C);
+}
+
+TEST(Parameters, EachThermalParameterArrivesWhereItCounts) {
+  firmware::HeatParameters p = firmware::heat_parameters_from(bench::motor(), {0.11f, 0.12f, 0.13f});
+  p.margin_sigmas_count = 3, p.ambient_degC = 35, p.ambient_sigma_K = 6, p.housing_noise_K = 0.7f;
+  p.housing_lag_s = 20, p.housing_offset_K = -4;
+  const thermal::EstimatorSettings s = firmware::estimator_settings(p);
+  EXPECT_EQ(s.trust.power, 0.11f);
+  EXPECT_EQ(s.trust.inner_resistance, 0.12f);
+  EXPECT_EQ(s.trust.cooling, 0.13f);
+  EXPECT_EQ(s.margin_sigmas, 3.0f);
+  EXPECT_EQ(s.ambient_degC, 35.0f);
+  EXPECT_EQ(s.ambient_sigma_K, 6.0f);
+  EXPECT_EQ(s.housing_noise_K, 0.7f);
+  const thermal::HeatSet<double> set = firmware::heat_set(p, 0.2f);
+  EXPECT_EQ(set.housing.lag_s, 20.0);
+  EXPECT_EQ(set.housing.offset_K, -4.0);
+}
+
 TEST(Parameters, ContradictionsAreFound) {
   struct Row {
     float AxisParameters::*field;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -147,6 +148,19 @@ TEST(Estimator, FindsAnAmbientItWasNotTold) {
   }
 }
 
+TEST(Estimator, AHousingThatFollowsItsAmbientAtOnceTeachesItOnce) {
+  const wire::Motor cooled = reference::motor(2.7, 4.5, 0.001, 0.5, 0.05);  // 50 ms from ambient to housing
+  for (double ambient : {-4.0, 23.0}) {
+    EstimatorSettings s = with(thermal::exact_trust);
+    s.ambient_sigma_K = 30;
+    Bench bench(cooled, s, ambient);
+    bench.run(1, 0);
+    EXPECT_GT(bench.core.estimate().ambient_degC, ambient - 0.5);
+    bench.run(2, 10);
+    EXPECT_GT(bench.core_error_K(), -1.0) << ambient;
+  }
+}
+
 TEST(Estimator, SigmaGrowsWithLoadAndCoversASheetThatIsWrong) {
   Bench idle(reference::ec16(), with(thermal::sheet_trust), 25),
       loaded(reference::ec16(), with(thermal::sheet_trust), 25);
@@ -170,6 +184,26 @@ TEST(Estimator, SigmaGrowsWithLoadAndCoversASheetThatIsWrong) {
     EXPECT_LE(static_cast<double>(bench.plant.degC[0]),
               static_cast<double>(bench.core.estimate().hottest_margin_degC()));
   }
+}
+
+TEST(Estimator, AMarginShrinksNoSoonerThanItsCorrectionFlowsIn) {
+  // A housing as light as its winding tells much about it, in readings half a second apart.
+  const wire::Motor sheet = reference::motor(0.05, 3.7, 100, 0.5, 10);
+  wire::Motor real = sheet;
+  real.C1_J_per_K *= 0.8;
+  Bench bench(real, with({0.3f, 0.02f, 0.0f}), 40, sheet);
+  bench.run(2, 0);
+  double colder_K = 0, fall_K = 0;
+  float last_degC = 0;
+  for (int i = 0; i < 300; ++i) {
+    bench.run(0.01, 350);
+    const float margin_degC = bench.core.estimate().hottest_margin_degC();
+    colder_K = std::max(colder_K, static_cast<double>(bench.plant.degC[0]) - static_cast<double>(margin_degC));
+    fall_K = std::max(fall_K, static_cast<double>(last_degC - margin_degC));
+    last_degC = margin_degC;
+  }
+  EXPECT_LT(colder_K, 1.0) << "of the truth";
+  EXPECT_LT(fall_K, 2.0) << "in 10 ms, while it is heated";
 }
 
 TEST(Estimator, SigmaOfErrorsThatGoTogetherIsTheSpreadOfSuchMotors) {
@@ -449,6 +483,36 @@ TEST(Estimator, AHotReadingAlwaysRaises) {
   EXPECT_GT(bench.core.estimate().hottest_degC(), before + 15);
 }
 
+TEST(Estimator, WhatASensorIsToldToMisreadIsTakenOffWhereverItIsHeard) {
+  // Soaked as believed; then a start that remembers a cold motor, whose housing is at 90 degC.
+  const auto heard = [](double offset_K, double gain_error, double lag_s) {
+    thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+    set.housing.offset_K = offset_K, set.housing.gain_error = gain_error, set.housing.lag_s = lag_s;
+    const auto reads = [&](double degC) {
+      return Reading{static_cast<float>(degC + gain_error * (degC - 25) + offset_K), true};
+    };
+    CoreEstimator soaked(set, with(thermal::identified_trust)), restored(set, with(thermal::identified_trust));
+    double coldest_degC = 1e9;
+    for (int i = 0; i < 2000; ++i) {
+      soaked.tick({}, reads(40));
+      coldest_degC = std::min(coldest_degC, soaked.estimate().hottest_degC());
+    }
+    restored.restore({4, {25, 25, 25, 25}, {5, 5, 5, 5}, 25}, nan);
+    for (int i = 0; i < 60; ++i) restored.tick({}, reads(90));
+    return std::array{coldest_degC, soaked.estimate().ambient_degC, restored.estimate().hottest_degC()};
+  };
+  for (const double lag_s : {0.0, 100.0}) {
+    const auto right = heard(0, 0, lag_s);
+    for (const double offset_K : {-20.0, 20.0}) {
+      for (const double gain_error : {-0.3, 0.3}) {
+        const auto misread = heard(offset_K, gain_error, lag_s);
+        for (std::size_t k = 0; k < right.size(); ++k)
+          EXPECT_NEAR(misread[k], right[k], 0.5) << k << ": " << offset_K << " K, " << gain_error << ", " << lag_s;
+      }
+    }
+  }
+}
+
 TEST(Estimator, AGlitchUpwardsIsForgottenAndAHousingThatStaysHotIsFollowed) {
   Bench bench(reference::ec16(), with(thermal::identified_trust), 25);
   bench.run(120, 2);
@@ -471,6 +535,21 @@ TEST(Estimator, WhatIsNotANumberIsReplacedByFullScale) {
     EXPECT_GT(now.degC[1], good.estimate().degC[1] + 1.0);
     for (int i = 0; i < 4; ++i) EXPECT_TRUE(std::isfinite(now.degC[i]));
   }
+}
+
+TEST(Estimator, ASpeedThatIsNotANumberCountsForMoreEachTime) {
+  CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  HeatInput<> input;
+  input[Drive::speed_rad_per_s] = 100;
+  core.tick(input, at_25);
+  input[Drive::speed_rad_per_s] = nan;
+  double last = 100;
+  for (int i = 0; i < 100; ++i) {
+    core.tick(input, at_25);
+    ASSERT_GE(core.input()[Drive::speed_rad_per_s], last);
+    last = core.input()[Drive::speed_rad_per_s];
+  }
+  EXPECT_EQ(last, 1e4);
 }
 
 TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
@@ -542,6 +621,14 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
   EXPECT_NEAR(after(1e5), 40.0, 0.01);
   memory.degC[0] = std::nanf("");
   EXPECT_NEAR(after(nan), 155.0, 1e-3) << "a torn record counts as a motor at its limit";
+}
+
+TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
+  wire::Motor cool = reference::ec16();
+  cool.winding_max_degC = 45;
+  CoreEstimator core(thermal::three_phase_set(cool), {});
+  core.start_hot();
+  EXPECT_GE(core.estimate().hottest_degC(), 40.0) << "10 K below the limit would be 35";
 }
 
 TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {

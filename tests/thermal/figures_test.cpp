@@ -232,10 +232,43 @@ TEST(LookAhead, SecondsLeftAgreesWithTheReference) {
   }
 }
 
+TEST(LookAhead, BeginsAtTheMarginNotAtTheEstimate) {
+  thermal::CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
+  core.raise_to(100);
+  const float margin_degC = core.estimate().hottest_margin_degC();
+  ASSERT_GT(margin_degC, 120.0f);
+  const thermal::Piece rest{0.01f, 0};
+  EXPECT_NEAR(thermal::LookAhead(core.network()).play(core, &rest, 1, rotating).peak_degC, margin_degC, 0.01f);
+}
+
 TEST(LookAhead, AStandingRotorLastsLess) {
   const auto core = soaked(reference::ec16(), 25);
   const thermal::LookAhead look(core.network());
   EXPECT_LT(look.seconds_left(core, 10, {{1.0f, 0.25f, 0.25f}}), 0.6f * look.seconds_left(core, 10, rotating));
+}
+
+TEST(LookAhead, HeatThatFollowsTheCurrentAtAnySpeedIsForeseenAndPowerOfThePastIsNot) {
+  const auto peak_degC = [](thermal::Drive drive, double gain) {
+    thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+    for (std::int8_t k = 0; k < 3; ++k) set.sources[set.source_count++] = {k, drive, gain, 0.0};
+    thermal::EstimatorSettings s;
+    s.trust = thermal::exact_trust;
+    thermal::CoreEstimator core(set, s);
+    thermal::HeatInput<> turning;
+    thermal::set_speed(turning, 100);
+    for (int i = 0; i < 60; ++i) {
+      turning[thermal::Drive::power_W] = i == 59 ? 1 : 0;  // just now, from the bus
+      core.tick(turning, {25.0f, true}, {25.0f, true});
+    }
+    const thermal::Piece push{0.2f, 5};
+    return static_cast<double>(thermal::LookAhead(core.network()).play(core, &push, 1, rotating).peak_degC);
+  };
+  const double without = peak_degC(thermal::Drive::current_speed, 0);
+  // 10 W for 0.2 s in a third of 1.13 J/K, whatever names them.
+  const double expected_K = 10 * 0.2 / (1.13 / 3);
+  EXPECT_NEAR(peak_degC(thermal::Drive::current_speed, 10.0 / (5 * 100)) - without, expected_K, 0.3 * expected_K);
+  EXPECT_NEAR(peak_degC(thermal::Drive::current2_speed2, 10.0 / (25 * 1e4)) - without, expected_K, 0.3 * expected_K);
+  EXPECT_NEAR(peak_degC(thermal::Drive::power_W, 10), without, 0.5) << "10 W for 10 ms";
 }
 
 TEST(LookAhead, UnusableOrEndlessProfilesAreNotFeasible) {

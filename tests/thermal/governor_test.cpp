@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/thermal/reference.hpp"
+#include "thermal/losses.hpp"
 #include "thermal/motor_set.hpp"
 
 namespace {
@@ -451,6 +452,29 @@ TEST(Governor, ABrokenEstimateAllowsNothingAndSaysBlind) {
   set.nodes[0].max_degC = std::nanf("");  // validate() would refuse it
   thermal::CoreEstimator core(set, Loop::exact());
   EXPECT_EQ(thermal::Governor(GovernorSettings{}).tick(core).current_A, 0.0f);
+}
+
+TEST(Governor, NeighboursThatWillCoolANodeGiveItNoMoreThanItHas) {
+  // 1 K of room and 3 K of neighbours that are colder than the limit: 0.1 and 0.3 of the most within soft_K.
+  const NodeBudget magnet{100.0f, 0.1f, 3.0f, 0.0f, 1.0f};
+  EXPECT_NEAR(thermal::allowed_current_A(99.0f, magnet, {}), (0.1f + 0.3f) * 20.0f, 0.01f);
+}
+
+TEST(Governor, WhatTurningAddsToCopperCountsAgainstTheCurrent) {
+  thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+  const auto budget = [&] {
+    thermal::CoreEstimator core(set, Loop::exact());
+    HeatInput<> input;
+    input[Drive::current_A] = 4;
+    thermal::set_speed(input, 100);
+    core.tick(input, {25.0f, true});
+    return thermal::node_budget(core, 0, {{0.5f, 0.5f, 0.5f}});
+  };
+  const NodeBudget plain = budget();
+  set.sources[set.source_count++] = {0, Drive::current2_speed2, 1e-5, 0.0};  // 0.1 W for each A^2 at that speed
+  const NodeBudget turning = budget();
+  EXPECT_NEAR(turning.gain_W_per_A2, plain.gain_W_per_A2 + 0.1f, 1e-4f);
+  EXPECT_NEAR(turning.hold_W, plain.hold_W, 1e-3f) << "and is not taken off twice";
 }
 
 TEST(Governor, WithoutCurrentEachPhaseCountsAsTheHottest) {
