@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+#include "identify/log/guesses.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <optional>
+
+#include "identify/log/units.hpp"
+#include "wire/pc/names.hpp"
+#include "wire/pc/user_error.hpp"
+
+namespace identify {
+
+using wire::pc::refuse_data;
+
+namespace {
+/// Does a word of a name begin so? "T_case" and "motorTemp" do with "t_" and "temp", "input_speed" not with "t_".
+bool has_word(const std::string& name, std::string_view beginning) {
+  const auto letter = [&](std::size_t at) { return std::isalpha(static_cast<unsigned char>(name[at])) != 0; };
+  const auto capital = [&](std::size_t at) { return std::isupper(static_cast<unsigned char>(name[at])) != 0; };
+  const std::string low = in_small(name);
+  for (std::size_t at = low.find(beginning); at != std::string::npos; at = low.find(beginning, at + 1)) {
+    if (at == 0 || !letter(at - 1) || !letter(at) || (capital(at) && !capital(at - 1))) return true;
+  }
+  return false;
+}
+}  // namespace
+
+bool named_rms(const std::string& name) { return has_word(name, "rms") || in_small(bracketed(name)).ends_with("rms"); }
+
+const char* rms_unit(Role role) {
+  return role == Role::current ? ":1.2247A" : role == Role::iq || role == Role::id ? ":1.4142A" : "";
+}
+
+bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "electric"); }
+
+namespace {
+
+/// A role, and what words of its columns begin with, in small letters.
+struct Likely {
+  Role role;
+  std::vector<const char*> words;
+};
+
+/// A column, and what it may be.
+struct Guess {
+  Role role;
+  std::string column, unit;  // "", or as ":ms"
+  /// As a command line takes it.
+  std::string option() const { return "--column " + own_name(role) + "=" + for_a_shell(column + unit); }
+};
+
+std::vector<std::string> columns_of(const std::map<Role, Source>& found) {
+  std::vector<std::string> out;
+  for (const auto& [unused, source] : found) out.push_back(source.column);
+  return out;
+}
+
+/// Metres a second, or the like: of what the motor drives.
+bool of_a_vehicle(const std::string& name) {
+  return has_word(name, "mps") || has_word(name, "kmh") || has_word(name, "km/h") || has_word(name, "meters") ||
+         has_word(name, "m/s");
+}
+
+/// Of the first words that a column has which moves and is not `taken`.
+std::optional<Guess> likely_column(const Table& table, const std::vector<std::string>& taken,
+                                   const std::vector<Likely>& likely) {
+  for (const bool moves : {true, false}) {
+    for (const auto& [role, words] : likely) {
+      for (std::size_t c = 0; c < table.names.size(); ++c) {
+        const std::string& name = table.names[c];
+        if (std::find(taken.begin(), taken.end(), name) != taken.end()) continue;
+        if (role == Role::speed && of_a_vehicle(name)) continue;
+        const std::vector<double>& cells = table.columns[c];
+        const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
+        const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
+        if (!has || stands == moves) continue;
+        const std::string unit = named_rms(name)                              ? rms_unit(role)
+                                 : role == Role::time && has_word(name, "ms") ? ":ms"
+                                                                              : "";
+        return Guess{role, name, unit};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+/// What has to be said with a speed's column whose name tells no unit of the shaft's.
+std::string speed_words(const std::string& name) {
+  if (named_electrical(name)) return " (electrical: with its unit, as :0.1429rpm of seven pole pairs)";
+  return unit_in_name(name, own_name(Role::speed)).empty() ? " (and its unit, as :rpm)" : "";
+}
+
+/// The current in d beside that in q: its name with a d for a q.
+std::optional<Guess> twin_of(const Table& table, std::string q) {
+  for (char& c : q) {
+    const char as_it_was = c;
+    c = c == 'q' ? 'd' : c == 'Q' ? 'D' : c;
+    if (c != as_it_was && table.find(q) >= 0) return Guess{Role::id, q, ""};
+    c = as_it_was;
+  }
+  return std::nullopt;
+}
+
+const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung"}}},
+                          housings = {{Role::housing, {"housing", "casing", "case", "yoke", "geh\u00e4use"}},
+                                      {Role::housing, {"stator"}}},
+                          rooms = {{Role::ambient, {"ambient", "room", "umgebung"}}},
+                          coolants = {{Role::coolant, {"coolant"}}};
+
+/// Columns that nothing needs, and that would tell more; `what` each is.
+std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
+  const std::pair<std::vector<Likely>, const char*> useful[] = {
+      {{{Role::speed, {"velocity", "speed", "rpm", "erpm", "omega", "drehzahl"}}}, "the motor's speed"},
+      {windings, "the winding's temperature"},
+      {housings, "the housing's temperature"},
+      {rooms, "the room's temperature"},
+      {coolants, "the coolant's temperature"},
+      {{{Role::session, {"session", "profile_id", "run_id", "test_id", "episode"}}}, "what tells sessions apart"}};
+  std::vector<std::pair<Guess, const char*>> out;
+  for (const auto& [likely, what] : useful) {
+    const auto guess =
+        found.contains(likely.front().role) ? std::nullopt : likely_column(table, columns_of(found), likely);
+    if (!guess) continue;
+    found[guess->role] = {guess->column};
+    out.emplace_back(*guess, what);
+  }
+  if (found.contains(Role::iq) && !found.contains(Role::id)) {
+    if (const auto twin = twin_of(table, found.at(Role::iq).column)) out.emplace_back(*twin, "the current in d");
+  }
+  return out;
+}
+
+/// Databases and dashboards export one value a row, beside what it is of.
+void refuse_one_value_a_row(const Table& table) {
+  const auto any = [&](std::initializer_list<std::string_view> of) {
+    const auto at = std::find_if(table.names.begin(), table.names.end(), [&](const std::string& name) {
+      return std::find(of.begin(), of.end(), in_small(name)) != of.end();
+    });
+    return at == table.names.end() ? std::string() : *at;
+  };
+  const std::string value = any({"_value", "value", "state"});
+  const std::string of =
+      any({"_field", "field", "entity_id", "metric", "signal", "signal_name", "channel", "variable"});
+  if (!value.empty() && !of.empty())
+    refuse_data(
+        fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
+                    "quantity has a column, and export it again.",
+                    table.file, value, of));
+}
+
+/// A temperature of the motor, where no column has such a role: the housing's rather than the winding's.
+std::optional<Guess> likely_temperature(const Table& table, const std::map<Role, Source>& found) {
+  std::vector<std::string> taken = columns_of(found);
+  const auto winding = likely_column(table, taken, windings);
+  for (const auto& other : {windings, rooms, coolants}) {
+    while (const auto of_it = likely_column(table, taken, other)) taken.push_back(of_it->column);
+  }
+  std::vector<Likely> likely = housings;
+  likely.insert(likely.begin(), {Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp"}});
+  if (!winding) likely.push_back({Role::housing, {"temp", "degc", "\u00b0c", "t_"}});
+  const auto housing = likely_column(table, taken, likely);
+  return housing ? housing : winding;
+}
+
+}  // namespace
+
+void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
+  for (const auto& [guess, what] : useful_columns(table, found))
+    notes.push_back(fmt::format("A column may be {} and is not used: if it is, say {}{}.", what, guess.option(),
+                                guess.role == Role::speed ? speed_words(guess.column) : ""));
+}
+
+void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
+  const auto none_of = [&](std::initializer_list<Role> roles) {
+    return std::none_of(roles.begin(), roles.end(), [&](Role r) { return found.contains(r); });
+  };
+  std::map<Role, Source> taken = found;
+  std::vector<std::string> missing_ones, hints;
+  const auto ask_for = [&](const char* what, const std::optional<Guess>& guess, const char* hint, Role otherwise) {
+    missing_ones.emplace_back(what);
+    if (guess) taken[guess->role] = {guess->column};
+    hints.push_back(
+        fmt::format(fmt::runtime(hint), guess ? guess->option() : "--column " + own_name(otherwise) + "=NAME"));
+  };
+  if (!by_row && none_of({Role::time}))
+    ask_for("a time column",
+            likely_column(table, columns_of(taken),
+                          {{Role::time, {"time", "zeit", "stamp", "ms"}}, {Role::time, {"date", "datum"}}}),
+            "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
+  if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
+    const auto guess = likely_column(table, columns_of(taken),
+                                     {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
+                                      {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
+                                      {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
+                                      {Role::current, {"current", "curr", "strom", "amp"}},
+                                      {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
+                                      {Role::torque, {"torque", "effort", "drehmoment"}},
+                                      {Role::power, {"loss", "p_loss", "verlust"}},
+                                      {Role::power, {"power", "watt", "leistung"}}});
+    ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
+    if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";
+    if (guess && guess->role == Role::power) hints.back() += " if that is what heats the winding";
+  }
+  if (none_of({Role::housing, Role::core}))
+    ask_for("a measured temperature (housing_degC or core_degC)", likely_temperature(table, taken), "map it with {}",
+            Role::housing);
+  if (missing_ones.empty()) return;
+  refuse_one_value_a_row(table);
+  std::vector<std::string> useful;
+  for (const auto& [guess, unused] : useful_columns(table, taken))
+    useful.push_back(guess.option() + (guess.role == Role::speed ? speed_words(guess.column) : ""));
+  if (!useful.empty()) hints.push_back(fmt::format("of use as well: {}", fmt::join(useful, ", ")));
+  refuse_data(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
+                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "),
+                          fmt::join(table.names, ", ")));
+}
+
+}  // namespace identify
