@@ -119,7 +119,7 @@ Judged judged(Problem& problem, const std::vector<Log>& logs, const std::optiona
   poor = too_poor(problem, logs);
   if (!poor.empty()) return out;
   found = search(problem, {}, {}, doing);
-  if (found.late.s != 0) problem = heard(std::move(problem), found.late);
+  if (found.early_s > 0) problem = heard(std::move(problem), found.early_s);
   doing("asking whether the logs can tell, and whether they are read right");
   poor = too_short(problem, found);
   misses = !poor.empty() && found.verdict != Verdict::adequate;
@@ -202,7 +202,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   const Fit first = fit_baseline(problem);
   report.reasoning = noise_words(problem);
   auto [found, poor, misses, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
-  if (unseen && found.late.s != 0) unseen = heard(std::move(*unseen), found.late);
+  if (unseen && found.early_s > 0) unseen = heard(std::move(*unseen), found.early_s);
   widen_along_ridges(problem, found);
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;

@@ -121,14 +121,11 @@ Problem last_part(const Problem& problem, double fraction) {
   return out;
 }
 
-Problem heard(Problem problem, const Late& late) {
+Problem heard(Problem problem, double early_s) {
   for (Bins& log : problem.logs) {
     const std::size_t all = log.bins.size();
-    const auto bins = [&](double s) {
-      return static_cast<std::size_t>(std::clamp(std::ceil(s / log.width_s), 0.0, static_cast<double>(all)));
-    };
-    forget_readings(log, 0, bins(late.s + late.sure_s));
-    forget_readings(log, all - bins(late.sure_s - late.s), all);
+    const auto bins = static_cast<std::size_t>(std::ceil(early_s / log.width_s));
+    forget_readings(log, all - std::min(bins, all), all);
   }
   return problem;
 }

@@ -85,13 +85,9 @@ void warm_phases_unequally(Problem& problem);
 Problem first_part(const Problem& problem, double fraction);
 Problem last_part(const Problem& problem, double fraction);
 
-/// By how much the temperatures are late against the load, below 0 early, give or take.
-struct Late {
-  double s = 0, sure_s = 0;
-};
-
-/// Without the readings that then answer to a load before or after the log, which nobody recorded.
-Problem heard(Problem problem, const Late& late);
+/// Without the readings that answer to a load after the log where temperatures are ahead of the load by up to
+/// `early_s`: nobody recorded it. Of a load before the log, the first stands for it.
+Problem heard(Problem problem, double early_s);
 
 /// Logs that `fitted` has not seen, under what it believes and assumes: only the inputs and the readings are theirs.
 Problem unseen_by(const Problem& fitted, const std::vector<Log>& logs);

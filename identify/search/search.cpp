@@ -119,12 +119,12 @@ void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vecto
   fit_alone(problem, all, field);
 }
 
-/// Nothing where it is not what explains the logs best, alone.
-Late late_by(const Field& field, const Margins& margins) {
-  if (field.singles.empty() || !(field.singles.front().evidence > margins.detect)) return {};
+/// By how much the temperatures are ahead of the load at most, where that explains the logs best, alone; 0: not at all.
+double early_s(const Field& field, const Margins& margins) {
+  if (field.singles.empty() || !(field.singles.front().evidence > margins.detect)) return 0;
   const Fit& best = field.singles.front().fit;
   const int delay = coordinate_of(best, Edit::delay);
-  return delay < 0 ? Late{} : Late{best.x[delay], 2 * best.std_errors()[delay]};
+  return delay < 0 || !(best.x[delay] < 0) ? 0 : 2 * best.std_errors()[delay] - best.x[delay];
 }
 
 /// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
@@ -442,14 +442,13 @@ Found search(const Problem& given, const Margins& margins, const std::vector<std
   };
   doing("fitting each cause alone");
   if (!fit_alone_from(given)) return out;
-  out.late = late_by(field, margins);
-  if (out.late.s != 0) {
+  out.early_s = early_s(field, margins);
+  if (out.early_s > 0) {
     out.steps = {
-        fmt::format("Alone, temperatures {:.0f} s {} explain most: what they answer to at the {} of a log is not "
-                    "in it, so {:.0f} s of readings there are left out.",
-                    std::abs(out.late.s), out.late.s > 0 ? "late" : "early", out.late.s > 0 ? "begin" : "end",
-                    std::abs(out.late.s) + out.late.sure_s)};
-    if (!fit_alone_from(heard(given, out.late))) return out;
+        fmt::format("Alone, temperatures ahead of the load explain most: the last {:.0f} s of readings, which "
+                    "answer to a load after the log, are left out.",
+                    out.early_s)};
+    if (!fit_alone_from(heard(given, out.early_s))) return out;
   }
   out.baseline = out.chosen = field.baseline;
   out.noise = problem.noise;

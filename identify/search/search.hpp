@@ -89,8 +89,8 @@ struct Found {
   Candidate chosen;                            // what is believed best, whatever the verdict
   std::vector<std::vector<std::string>> tied;  // ids of the sets that are as good as the best, itself first
   std::vector<double> own_evidence;            // of each cause chosen: over the set without it
-  Late late;                                   // not 0: without the readings whose load is in no log
-  double remains_K = 0;                        // of a slow disturbance that the sets named or tied leave
+  double early_s = 0;    // by how much temperatures are ahead of the load: the last readings of each log were left out
+  double remains_K = 0;  // of a slow disturbance that the sets named or tied leave
   bool doubted = false;  // no cause is known, for a slow disturbance explains as much as the first set
   Noise noise;           // of the readings, as the best model's residuals show it
   Verdict verdict = Verdict::insufficient;
