@@ -124,7 +124,8 @@ double early_s(const Field& field, const Margins& margins) {
   if (field.singles.empty() || !(field.singles.front().evidence > margins.detect)) return 0;
   const Fit& best = field.singles.front().fit;
   const int delay = coordinate_of(best, Edit::delay);
-  return delay < 0 || !(best.x[delay] < 0) ? 0 : 2 * best.std_errors()[delay] - best.x[delay];
+  if (delay < 0 || !(best.x[delay] < 0)) return 0;
+  return std::min(2 * best.std_errors()[delay] - best.x[delay], -cause_of(best.chosen.front()).parameters[0].low);
 }
 
 /// Does a slow disturbance show that is more than sensors wander of themselves, and a coarse one's steps are known?
