@@ -290,7 +290,8 @@ bool never_changes(const Problem& problem) {
 
 std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
   // Cautious: of two hidden logs both were named rightly with three fifths of the housing's readings gone at random; of
-  // the load a seventh was too much already (masks.cpp), and of gaps three, 22 s of 20 min.
+  // the load a seventh was too much already (masks.cpp), and of gaps three, 22 s of 20 min. One with two fifths of its
+  // load gone in one stretch was named rightly as well.
   constexpr double most_missing = 0.35, most_in_gaps = 0.3;
   constexpr double least_span_K = 2;  // a thermistor wanders by 0.05 K: resistances are then known to 3 percent at best
   double span = 0, lasts_s = 0;
@@ -304,6 +305,13 @@ std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
                          100 * log.missing_share);
     if (log.gap_share > most_in_gaps)
       return fmt::format("{}: gaps make up {:.0f} % of its time; record it again.", log.name, 100 * log.gap_share);
+    std::size_t paused = 0;
+    for (const Start& start : log.starts) paused += start.paused;
+    if (const double share = static_cast<double>(paused) / static_cast<double>(log.bins.size()); share > most_missing)
+      return fmt::format(
+          "{}: nothing tells the heat input for {:.0f} % of its time; record it again, or, where its parts are recordings "
+          "of their own, tell them apart by a column (--column session=NAME).",
+          log.name, 100 * share);
     double low = 1e300, high = -1e300;
     for (const Bin& bin : log.bins) {
       const double T = bin.housing_n > 0 ? bin.housing_degC : bin.core_degC;

@@ -252,6 +252,10 @@ TEST(BadInput, FortyPercentMissing) {
   refused(spoilt([&](auto&, int) { return random() % 10 >= 4; }), "40 % of the readings or rows are missing");
   refused(spoilt([&](auto& row, int) { return row[3] = random() % 10 < 4 ? "" : row[3], true; }),
           "40 % of the readings or rows are missing");
+  const auto in_one_stretch = [](int row) { return row > 2700 && row < 6300; };
+  const char* untold = "nothing tells the heat input for 40 % of its time";
+  refused(spoilt([&](auto&, int row) { return !in_one_stretch(row); }), untold);
+  refused(spoilt([&](auto& row, int number) { return row[1] = in_one_stretch(number) ? "" : row[1], true; }), untold);
 }
 
 TEST(BadInput, ATemperatureReadEightTimes) {
