@@ -34,6 +34,7 @@ constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
 constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
+constexpr int acquired_readings = 120;  // a minute: what a start without memory takes to prove itself
 constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
@@ -219,8 +220,8 @@ void CoreEstimator::hear_housing(Reading housing) {
   const float leak = dt_f / movement_memory_s;
   const float sensor_degC = static_cast<float>(sensor_degC_);
   model_moved_K_ += sensor_degC - last_sensor_degC_ - leak * model_moved_K_;
+  last_sensor_degC_ = sensor_degC;
   settle(1);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // a correction is not a movement of the model
   pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
 
   const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
@@ -280,7 +281,7 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   if (!acquired_) {
     if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
     const int h = housing_.node;
-    acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K);
+    acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++met_ >= acquired_readings;
     trusted_ambient_degC_ = ambient_degC_;
     // After a reset the winding does not follow the housing by itself.
     raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
@@ -344,6 +345,7 @@ void CoreEstimator::settle(int steps) {
   for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
   ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
   sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
+  last_sensor_degC_ += part * due_K_[sensor()];  // a correction is not a movement of the model
   due_K_ *= 1.0f - part;
   due_margin_K_ *= 1.0f - part;
   due_steps_ -= steps;
@@ -526,6 +528,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   acquired_ = read_ = false;
+  met_ = 0;
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;

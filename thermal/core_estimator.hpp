@@ -173,6 +173,7 @@ class CoreEstimator {
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;
   int window_ = 0, silent_ = 0, unheard_ = 0;  // steps: of readings in it, without one, since it was last full
   bool acquired_ = false, read_ = false, ambient_known_ = false;
+  int met_ = 0;                        // readings that were believed without limit
   bool resumed_ = false;               // after a reset: the sensor may lag behind what was remembered
   double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
   float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately

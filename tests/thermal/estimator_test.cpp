@@ -332,6 +332,40 @@ TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIs
   }
 }
 
+/// A reset comes into a load, and the sensor stands still from there on, or where it was never right. Neither is the
+/// jump to its first reading a movement that it would have to follow, nor is it believed without limit for ever because
+/// it might lag.
+TEST(Estimator, AStuckSensorIsFoundAsSoonAfterAResetInALoad) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double loaded_s : {0.0, 30.0, 120.0, 480.0}) {
+      for (const float off_K : {10.0f, 0.0f, -10.0f, -20.0f}) {
+        Bench b(reference::ec16(), with(trust), 25);
+        b.run(60, 1);
+        b.run(loaded_s, 5);
+        const thermal::HeatMemory memory = b.core.save();
+        b.core = CoreEstimator(thermal::three_phase_set(b.m), with(trust));
+        b.core.restore(memory, -1);
+        const Reading stuck = {b.honest().value + off_K, true};  // colder than it was: a wrong start is no promise
+        int found_s = 0;
+        double coldest_K = 0;
+        for (int s = 1; s <= 400; ++s) {
+          b.run(1, 5, [&] { return stuck; });
+          const double margin_degC = static_cast<double>(b.core.estimate().hottest_margin_degC());
+          coldest_K = std::min(coldest_K, margin_degC - static_cast<double>(b.plant.degC[0]));
+          if (found_s == 0 && b.flag(thermal::housing_contradicts)) found_s = s;
+        }
+        if (off_K <= 0.0f) {
+          EXPECT_GT(found_s, 0) << loaded_s << " s, " << off_K << " K";
+          EXPECT_LE(found_s, 120) << loaded_s << " s, " << off_K << " K";
+        }
+        if (off_K >= 0.0f) {
+          EXPECT_GT(coldest_K, -3.0) << loaded_s << " s, " << off_K << " K";
+        }
+      }
+    }
+  }
+}
+
 TEST(Estimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     for (const double share : {0.55, 0.6}) {
