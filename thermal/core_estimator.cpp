@@ -34,7 +34,7 @@ constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
 constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
-constexpr int acquired_readings = 120;  // a minute: what a start without memory takes to prove itself
+constexpr int acquired_readings = 120;    // a minute: what a start without memory takes to prove itself
 constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
