@@ -57,10 +57,12 @@ class RecordLog {
     found_ = {};
     for (int area = 0; area < hal::store_areas; ++area) {
       const std::span<const std::uint8_t> all = store.area(area);
-      std::size_t at = 0;
-      for (; at + slot_bytes_ <= all.size(); at += slot_bytes_) {
+      free_[area] = 0;
+      for (std::size_t at = 0; at + slot_bytes_ <= all.size(); at += slot_bytes_) {
         const std::span<const std::uint8_t> slot = all.subspan(at, slot_bytes_);
-        if (erased(slot)) break;
+        // An erase that was cut leaves gaps, so does a write that took no word. Behind the first one word tells.
+        if (erased(slot.first(at > free_[area] ? sizeof(std::uint32_t) : slot_bytes_))) continue;
+        free_[area] = at + slot_bytes_;
         const std::span<const std::uint8_t> payload = whole_payload(slot, magic_);
         if (payload.empty()) continue;
         std::uint32_t serial;
@@ -68,7 +70,6 @@ class RecordLog {
         if (found_.payload.empty() || static_cast<std::int32_t>(serial - found_.serial) > 0)
           found_ = {payload, serial, area, at};
       }
-      free_[area] = at;
     }
   }
 

@@ -335,6 +335,41 @@ TEST(ParameterStore, TheNewestCountsWhereverItStandsAndAnEraseThatFailsLosesNoth
   EXPECT_EQ(last.saved_serial(), 9u);
 }
 
+/// An erase takes a second, in which the power may go: then part of the area is erased and part still holds what it
+/// held, or something that can be neither written nor read.
+TEST(ParameterStore, AnAreaThatWasHalfErasedIsErasedAgain) {
+  for (const std::size_t erased_slots : {1u, 2u, 3u}) {
+    for (const std::uint8_t rest : {std::uint8_t{0x00}, std::uint8_t{0x5A}}) {
+      Bench b;
+      b.put_in_force();
+      for (int i = 0; i < 5; ++i) ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+      std::vector<std::uint8_t>& half = b.flash.cells[0];  // the newest record is in the other one
+      std::fill(half.begin(), half.end(), rest);
+      std::fill_n(half.begin(), erased_slots * ParameterStore::slot_bytes, std::uint8_t{0xFF});
+      ParameterStore next(bench::rating);
+      ASSERT_EQ(next.start(b.flash).status, 0);
+      ASSERT_EQ(next.saved_serial(), 5u);
+      for (int save = 1; save <= 7; ++save)
+        ASSERT_EQ(next.save(b.driver, b.flash).status, 0) << erased_slots << " slots, save " << save;
+    }
+  }
+}
+
+/// What was said to be saved is there after the next start, also behind a slot that took no word.
+TEST(ParameterStore, ASaveBehindOneThatFailedIsFoundAgain) {
+  Bench b;
+  b.put_in_force();
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  b.flash.words_left = 0;
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, code(Status::not_written));
+  b.flash.words_left = -1;
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  ParameterStore next(bench::rating);
+  ASSERT_EQ(next.start(b.flash).status, 0);
+  EXPECT_EQ(next.saved_serial(), 2u);
+  EXPECT_EQ(next.save(b.driver, b.flash).status, 0);
+}
+
 TEST(ParameterStore, WhatWasStagedIsTakenBackToTheSavedOrToTheDefaults) {
   Bench b;
   b.put_in_force();
