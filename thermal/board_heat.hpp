@@ -60,9 +60,11 @@ class BoardHeat {
   /// 0 cold .. 1 at the limit.
   float used_ratio() const { return static_cast<float>(used_A2_) / limit_A2_; }
 
-  /// After a reset with unknown time off: the share of the limit that was stored; anything unusable counts as full.
+  /// After a reset with unknown time off: the share of the limit that was stored, which may be more than all of it;
+  /// anything unusable counts as full.
   void restore(float ratio) {
-    used_A2_ = static_cast<double>(limit_A2_) * (ratio >= 0.0f && ratio <= 1.0f ? static_cast<double>(ratio) : 1.0);
+    constexpr float most = 25.0f;  // both axes at 20 A for ever would settle at 22
+    used_A2_ = static_cast<double>(limit_A2_) * (ratio >= 0.0f && ratio < most ? static_cast<double>(ratio) : 1.0);
   }
 
  private:

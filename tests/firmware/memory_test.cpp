@@ -87,6 +87,19 @@ TEST(Memory, AnotherMotorsRecordAndNoRecordAtAllStartHot) {
   }
 }
 
+/// A power stage whose own sensor read more than the limit has more than all of its heat used up.
+TEST(Memory, APowerStageAboveItsLimitIsNoColderAfterAReset) {
+  Driver before(bench::driver_setup());
+  before.restore(hot_memory());
+  const hal::AxisSlowSample axes[2] = {{{30.0f, true}}, {{30.0f, true}}};
+  before.slow_tick({{125.0f, true}, 0.0f, true}, axes);
+  const float used_ratio = before.board_heat().used_ratio();
+  ASSERT_GT(used_ratio, 1.4f);
+  Driver after(bench::driver_setup());
+  after.restore(before.memory());
+  EXPECT_NEAR(after.board_heat().used_ratio(), used_ratio, 1e-3f);
+}
+
 TEST(Memory, AFaultStaysLatchedThroughAResetUntilItIsCleared) {
   DriverMemory memory = hot_memory();
   memory.axes[1].fault = {wire::Fault::over_current, 1, 31.0f, 28.0f, 0.0f};
