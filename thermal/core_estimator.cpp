@@ -455,7 +455,7 @@ HeatMemory CoreEstimator::save() const {
                     flags_ & housing_contradicts ? 1u : 0u,
                     late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
   for (int i = 0; i < n_; ++i) {
-    memory.degC[i] = static_cast<float>(degC_[i]);
+    memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f);  // what is due now is so later
     memory.sigma_K[i] = estimate_.sigma_K[i];
   }
   return memory;

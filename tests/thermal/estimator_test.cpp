@@ -657,6 +657,21 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
   EXPECT_NEAR(after(nan), 155.0, 1e-3) << "a torn record counts as a motor at its limit";
 }
 
+/// What a sensor that was found out had taken is given back over half a second; a reset meanwhile does not keep it.
+TEST(Estimator, AResetTakesNothingOfWhatIsYetToBeGivenBack) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    Bench b(reference::ec16(), with(trust), 40);
+    b.run(60, 1);
+    const Reading stuck = b.honest();
+    while (!b.flag(thermal::housing_contradicts)) b.run(0.01, 5, [&] { return stuck; });
+    CoreEstimator again(thermal::three_phase_set(b.m), with(trust));
+    again.restore(b.core.save(), -1);
+    b.run(0.5, 5, [&] { return stuck; });
+    for (int i = 0; i < 50; ++i) again.tick(current(5), stuck);
+    EXPECT_GE(again.estimate().hottest_degC(), b.core.estimate().hottest_degC() - 0.1);
+  }
+}
+
 TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
   wire::Motor cool = reference::ec16();
   cool.winding_max_degC = 45;
