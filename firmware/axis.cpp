@@ -55,9 +55,9 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
 }
 
 void Axis::configure(const AxisSetup& setup, HeatModel heat) {
-  if (heat == HeatModel::changed) {
+  if (heat == HeatModel::changed && usable(setup.heat)) {  // without a model the old one goes on: it knows what is hot
     const thermal::HeatMemory memory = core_.save();
-    new (&core_) thermal::CoreEstimator(usable_or_nothing(setup.heat), setup.estimator);  // too large for the stack
+    new (&core_) thermal::CoreEstimator(setup.heat, setup.estimator);  // too large for the stack
     core_.restore(memory, 0.0);
     senses_housing_ = setup.senses_housing;
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <set>
 #include <vector>
 
@@ -194,6 +195,37 @@ TEST(ParameterStore, TheTemperaturesSurviveACommit) {
   ASSERT_EQ(b.store.stage({{0x0203, 0}, 5.0f}).status, 0);  // C1: another motor's
   ASSERT_EQ(b.store.commit(b.driver).status, 0);
   EXPECT_NEAR(b.driver.axis(0).core().estimate().hottest_degC(), 120.0, 0.1);
+}
+
+/// Whatever is committed, in any order: a set that is taken away and comes back, other limits, other masses.
+TEST(ParameterStore, NoOrderOfCommitsCoolsAnEstimate) {
+  std::mt19937 seed{20};
+  const auto drawn = [&seed](float from, float to) { return std::uniform_real_distribution<float>(from, to)(seed); };
+  for (int run = 0; run < 50; ++run) {
+    Bench b;
+    b.put_in_force();
+    b.driver.axis(0).restore({{4, {150, 140, 130, 90}, {4, 4, 4, 2}, 40}, {}});
+    const thermal::CoreEstimator& core = b.driver.axis(0).core();
+    const double winding_degC = core.estimate().hottest_degC(), housing_degC = core.estimate().housing_degC;
+    for (int step = 0; step < 6; ++step) {
+      if (drawn(0, 1) < 0.3f) {
+        ASSERT_EQ(b.store.load(wire::LoadFrom::defaults).status, 0);
+      } else {
+        b.stage(sheet_set(), 0);
+        ASSERT_EQ(b.store.stage({{0x0203, 0}, drawn(3, 30)}).status, 0);    // C1
+        ASSERT_EQ(b.store.stage({{0x0205, 0}, drawn(90, 250)}).status, 0);  // winding_max
+        ASSERT_EQ(b.store.stage({{0x020B, 0}, drawn(0, 5)}).status, 0);     // margin_sigmas
+        ASSERT_EQ(b.store.stage({{0x020C, 0}, drawn(-20, 80)}).status, 0);  // ambient
+        ASSERT_EQ(b.store.stage({{0x020E, 0}, drawn(0, 1) < 0.5f ? 0.0f : 1.0f}).status, 0);
+      }
+      ASSERT_EQ(b.store.commit(b.driver).status, 0);
+      b.tick(1);
+    }
+    b.stage(sheet_set(), 0);
+    ASSERT_EQ(b.store.commit(b.driver).status, 0);
+    EXPECT_GE(core.estimate().hottest_degC(), winding_degC - 1e-3) << run;
+    EXPECT_GE(core.estimate().housing_degC, housing_degC - 1e-3) << run;
+  }
 }
 
 /// In a room of 25 degC, which the housing proved though 40 degC are believed without it.
