@@ -2,6 +2,7 @@
 // How quickly a setpoint is obeyed, and how surely a silent host is left.
 
 #include <cmath>
+#include <random>
 
 #include "tests/usb/linked.hpp"
 
@@ -132,6 +133,134 @@ TEST_F(Linked, ASilentHostIsLeftAtAHundredMilliseconds) {
   EXPECT_EQ(axis(0).fast().limit, wire::Limit::setpoint_old);
   while (axis(0).mode() == firmware::Mode::running && periods < 20000) board.advance(1), ++periods;
   EXPECT_NEAR(periods * board.period_s(), 0.3, 0.002);
+}
+
+/// What holds in each PWM period whatever was asked for before, in any order.
+struct Invariants {
+  struct Asked {
+    float iq_A = 0.0f;        // by the last setpoint
+    int ago = 1 << 20;        // periods since it,
+    int arm_ago = 1 << 20;    // since arm
+    int clear_ago = 1 << 20;  // and since clear were sent
+    firmware::Mode mode = firmware::Mode::off;
+    float allowance_A = 0.0f;
+    double hottest_degC = 0.0;
+  };
+  Asked asked[2];
+
+  /// A frame may wait for the bus, and for an errand before it.
+  static constexpr int soon = 100;
+
+  void look(const firmware::Axis& axis, Asked& a) {
+    using firmware::Mode;
+    ++a.ago, ++a.arm_ago, ++a.clear_ago;
+    const Mode mode = axis.mode();
+    const float permitted_A = std::hypot(axis.fast().permitted_A.d, axis.fast().permitted_A.q);
+    const float allowance_A = axis.state().allowance_A;
+    if (mode != Mode::running) {
+      ASSERT_EQ(permitted_A, 0.0f);
+      ASSERT_EQ(axis.fast().ratio.a, 0.5f) << "the bridge is open";
+    }
+    ASSERT_LE(permitted_A, std::fmax(allowance_A, a.allowance_A) * 1.0001f);
+    const float left = 1.0f - static_cast<float>(a.ago - 2000 - soon) / 4000.0f;  // 100 ms, and a ramp of 200 ms
+    if (left < 1.0f) {
+      ASSERT_LE(permitted_A, std::fmax(left, 0.0f) * std::fabs(a.iq_A) + 1e-4f) << a.ago;
+    }
+    if (left < 0.0f) {
+      ASSERT_NE(mode, Mode::running);
+    }
+    if (a.mode == Mode::tripped && mode != Mode::tripped) {
+      ASSERT_LT(a.clear_ago, soon);
+      ASSERT_EQ(a.iq_A, 0.0f);
+    }
+    if (a.mode == Mode::off && mode != Mode::off && mode != Mode::tripped) {
+      ASSERT_LT(a.arm_ago, soon);
+    }
+    const double hottest_degC = axis.core().estimate().hottest_degC();
+    // By less in 10 ms, but where all of it is only believed to be as warm as an ambient of 70 degC at most.
+    if (a.hottest_degC > 70.0) {
+      ASSERT_GT(hottest_degC, a.hottest_degC - 2.0);
+    }
+    a.mode = mode, a.allowance_A = allowance_A, a.hottest_degC = hottest_degC;
+  }
+};
+
+TEST_F(Linked, NoOrderOfCommandsDrivesADisarmedAxisOrCoolsAnEstimate) {
+  std::mt19937 seed{11};
+  const auto drawn = [&seed](int from, int to) { return std::uniform_int_distribution<int>(from, to)(seed); };
+  Invariants held;
+  int ran[2] = {}, tripped = 0, committed = 0;
+  for (int step = 0; step < 3000 && !HasFatalFailure(); ++step) {
+    const auto mask = static_cast<std::uint8_t>(drawn(1, 3));
+    const auto each = [&](auto what) {
+      for (int i = 0; i < 2; ++i) {
+        if (mask >> i & 1) what(held.asked[i], i);
+      }
+    };
+    const auto send = [&](Kind kind, const Bytes& payload = {}) {
+      program.write(Program::framed(kind, static_cast<std::uint8_t>(step), payload));
+    };
+    switch (drawn(0, 15)) {
+      case 0:
+      case 1:
+      case 2:
+        each([](Invariants::Asked& a, int) { a.arm_ago = 0; });
+        send(Kind::arm, {mask});
+        break;
+      case 3:
+        send(Kind::disarm, {mask});
+        break;
+      case 4:
+      case 5:
+        each([](Invariants::Asked& a, int) { a.clear_ago = 0; });
+        send(Kind::clear, {mask});
+        break;
+      case 6: {
+        constexpr std::uint16_t ids[] = {0x0111, 0x0203, 0x0205, 0x020C};  // current limit, C1, limit, ambient
+        constexpr float from[] = {2, 2, 80, -20}, to[] = {20, 30, 200, 70};
+        const int k = drawn(0, 3);
+        const float value = from[k] + (to[k] - from[k]) * static_cast<float>(drawn(0, 100)) / 100.0f;
+        send(Kind::stage, bytes_of(wire::Assignment{{ids[k], static_cast<std::uint8_t>(mask & 1)}, value}));
+        break;
+      }
+      case 7:
+        ++committed;
+        send(Kind::commit);
+        break;
+      case 8:
+        send(drawn(0, 1) == 0 ? Kind::save : Kind::commit);
+        break;
+      case 9:
+        send(Kind::load, {static_cast<std::uint8_t>(drawn(0, 2))});
+        break;
+      case 10:
+        if (drawn(0, 9) == 0) {
+          each([&](Invariants::Asked&, int i) {
+            (void)axis(i).tick({{40.0f, -20.0f, -20.0f}, 48.0f, 1.0f, static_cast<std::uint32_t>(step), true});
+          });
+          ++tripped;
+        }
+        break;
+      default: {
+        const float iq_A = drawn(0, 2) == 0 ? 0.0f : static_cast<float>(drawn(-20, 20));
+        each([&](Invariants::Asked& a, int) { a.iq_A = iq_A, a.ago = 0; });
+        send(Kind::setpoint, setpoint(mask, iq_A, iq_A));
+      }
+    }
+    program.frames().clear();
+    const int periods = drawn(0, 40) == 0 ? 7000 : drawn(1, 200);
+    for (int k = 0; k < periods && !HasFatalFailure(); ++k) {
+      if (k % 4 == 0) program.exchange();
+      board.advance(1);
+      for (int i = 0; i < 2; ++i) {
+        held.look(axis(i), held.asked[i]);
+        ran[i] += axis(i).mode() == firmware::Mode::running;
+      }
+    }
+  }
+  std::printf("  %d and %d periods ran, %d trips, %d commits\n", ran[0], ran[1], tripped, committed);
+  EXPECT_GT(ran[0], 10000);
+  EXPECT_GT(ran[1], 10000);
 }
 
 /// Both axes' setpoint and state, one exchange a USB frame, packets at most as many as a full-speed frame holds.
