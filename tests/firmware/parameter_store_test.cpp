@@ -145,6 +145,31 @@ TEST(ParameterStore, ASetIsRefusedAsAWholeAndNothingChanges) {
   EXPECT_FALSE(b.store.uncommitted());
 }
 
+/// Also of the thermal ones, each by its own name.
+TEST(ParameterStore, TheFirstThermalParameterThatIsWrongIsNamed) {
+  Bench b;
+  b.put_in_force();
+  ASSERT_EQ(b.store.stage({{0x0203, 1}, wire::unset}).status, 0);  // C1
+  wire::Answer answer = b.store.commit(b.driver);
+  EXPECT_EQ(answer.status, code(Status::parameters_unset));
+  EXPECT_EQ(answer.axis, 1);
+  EXPECT_EQ(answer.id, 0x0203);
+  b.stage(sheet_set(), 1);
+  ASSERT_EQ(b.store.stage({{0x0205, 1}, 50.0f}).status, 0);  // winding_max
+  ASSERT_EQ(b.store.stage({{0x020C, 1}, 60.0f}).status, 0);  // ambient
+  answer = b.store.commit(b.driver);
+  EXPECT_EQ(answer.status, code(Status::parameter_refused));
+  EXPECT_EQ(answer.id, 0x020C);
+}
+
+/// Half a set makes no heat model, whichever half it is.
+TEST(ParameterStore, NoHeatModelIsBuiltOfHalfASet) {
+  firmware::AxisSet no_resistance = sheet_set(), no_heat = sheet_set();
+  no_resistance.drive.phase_resistance_ohm = wire::unset;
+  no_heat.heat.R1_K_per_W = wire::unset;
+  for (const firmware::AxisSet& set : {no_resistance, no_heat}) EXPECT_EQ(firmware::setup_from(set).heat.node_count, 0);
+}
+
 TEST(ParameterStore, UnknownIdsAxesAndValuesOutOfRangeAreRefusedOneByOne) {
   Bench b;
   float value;
