@@ -123,6 +123,19 @@ TEST(Parameters, ContradictionsAreFound) {
   }
 }
 
+/// Ten samples a time constant, exactly: also at a rate at which the dictionary's own bounds are too wide.
+TEST(Parameters, ABandwidthIsAtMostATenthOfThePwm) {
+  firmware::BoardRating slow = bench::rating;
+  slow.pwm_Hz = 10e3f;
+  AxisParameters p = bench::parameters();
+  p.current_bandwidth_Hz = p.rotor_bandwidth_Hz = 0.1f * slow.pwm_Hz;
+  EXPECT_EQ(validate(p, slow).id, 0);
+  p.current_bandwidth_Hz = 1001.0f;
+  EXPECT_EQ(validate(p, slow).id, 0x0112);
+  p.current_bandwidth_Hz = 1000.0f, p.rotor_bandwidth_Hz = 1001.0f;
+  EXPECT_EQ(validate(p, slow).id, 0x0113);
+}
+
 TEST(Parameters, AListThatContradictsItselfDoesNotPass) {
   using wire::ParameterInfo;
   using wire::Unit;
