@@ -58,6 +58,17 @@ TEST(Permit, WhatFitsIsGrantedWithoutAReason) {
   EXPECT_EQ(got.reason, Limit::none);
 }
 
+/// Both components fade, and the vector keeps its direction.
+TEST(Permit, AFieldCurrentThatIsTooOldFadesToo) {
+  Asking asking;
+  (void)asking.permit({-8.0f, 6.0f}, 20.0f);
+  for (int i = 0; i < 4000; ++i) asking.setpoint.follow(1);  // 0.2 s: half of the ramp behind the time-out
+  const auto got = asking.law.permit(asking.setpoint, {20.0f, Limit::core_hot}, 1, 48.0f, 0.0f);
+  EXPECT_NEAR(got.current_A.d, -4.0f, 0.01f);
+  EXPECT_NEAR(got.current_A.q, 3.0f, 0.01f);
+  EXPECT_EQ(got.reason, Limit::setpoint_old);
+}
+
 TEST(Permit, AnAllowanceThatIsBrokenAllowsNothing) {
   for (const float broken : {nan, -nan, -1.0f, 20.001f, std::numeric_limits<float>::infinity(), -1e-30f}) {
     Asking asking;
