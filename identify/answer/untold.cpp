@@ -51,9 +51,8 @@ std::vector<double> told_either(std::vector<double> load, unsigned draw, bool ot
   return out;
 }
 
-/// In each row the most, or the least, that it and its neighbours tell: what flowed, if rows keep step with a gait.
-std::vector<double> told_around(const std::vector<double>& load, bool most) {
-  const std::vector<double> told = told_next(load);
+/// In each row the most, or the least, that it and its neighbours tell.
+std::vector<double> told_around(const std::vector<double>& told, bool most) {
   std::vector<double> out = told;
   for (std::size_t i = 1; i + 1 < told.size(); ++i) {
     for (const double x : {told[i - 1], told[i + 1]}) {
@@ -62,8 +61,49 @@ std::vector<double> told_around(const std::vector<double>& load, bool most) {
   }
   return out;
 }
-std::vector<double> told_at_crests(std::vector<double> load) { return told_around(load, true); }
-std::vector<double> told_in_troughs(std::vector<double> load) { return told_around(load, false); }
+
+/// Rows that keep step with a gait come to the same few places of it again, and may miss its mean by one part in as
+/// many, all the time: that share, for each row. Zero where rows are draws, for those miss it now so, now so.
+std::vector<double> shares_in_step(const std::vector<double>& told) {
+  constexpr std::size_t rows = 60, places = 10;  // looked at together; so few that one of them weighs much
+  // Of two variances. By what repeats itself within ten rows as well as that, 60 rows come to few other places.
+  constexpr double repeats = 0.005;
+  std::vector<double> out(told.size(), 0.0);
+  for (std::size_t from = 0; from < told.size(); from += rows) {
+    const std::size_t to = std::min(from + rows, told.size()), n = to - from;
+    double sum = 0, square = 0;
+    for (std::size_t i = from; i < to; ++i) sum += std::abs(told[i]), square += told[i] * told[i];
+    const double mean = sum / static_cast<double>(n), variance = square / static_cast<double>(n) - mean * mean;
+    for (std::size_t q = 2; q <= places && q < n; ++q) {
+      double apart2 = 0;
+      for (std::size_t i = from + q; i < to; ++i) apart2 += std::pow(std::abs(told[i]) - std::abs(told[i - q]), 2);
+      if (!(apart2 < 2 * repeats * variance * static_cast<double>(n - q))) continue;
+      std::fill(out.begin() + static_cast<std::ptrdiff_t>(from), out.begin() + static_cast<std::ptrdiff_t>(to),
+                1 / static_cast<double>(q));
+      break;
+    }
+  }
+  return out;
+}
+
+/// As far towards the most or the least as rows that keep step may be off.
+std::vector<double> told_in_step(std::vector<double> load, bool most) {
+  std::vector<double> out = told_next(std::move(load));
+  const std::vector<double> end = told_around(out, most), share = shares_in_step(out);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] += share[i] * (end[i] - out[i]);
+  return out;
+}
+std::vector<double> told_at_crests(std::vector<double> load) { return told_in_step(std::move(load), true); }
+std::vector<double> told_in_troughs(std::vector<double> load) { return told_in_step(std::move(load), false); }
+
+/// The most or the least, drawn for each row, or the `other` of the two.
+std::vector<double> told_somewhere(std::vector<double> load, unsigned draw, bool other) {
+  std::mt19937 random(draw);
+  std::vector<double> out = told_next(std::move(load));
+  const std::vector<double> most = told_around(out, true), least = told_around(out, false);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = ((random() % 2 == 0) != other ? most : least)[i];
+  return out;
+}
 
 /// The same logs under a load that is `as` makes it of what was measured.
 Problem under(const Problem& problem, std::vector<Log> logs,
@@ -131,16 +171,53 @@ bool alternates_between_rows(const std::vector<Log>& logs) {
   return twice < least * once && once > much * all;
 }
 
-/// How far two simulations of the logs' housings differ, rms; of their windings, where no housing was read.
-double apart_K(const Problem& a, const Fit& fit_a, const Problem& b, const Fit& fit_b) {
-  double square = 0, bins = 0;
+/// How far two simulations of the logs differ, rms.
+struct Apart {
+  double housing_K, core_K;
+};
+Apart apart(const Problem& a, const Fit& fit_a, const Problem& b, const Fit& fit_b) {
+  double housing2 = 0, core2 = 0, bins = 0;
   for (std::size_t l = 0; l < a.logs.size(); ++l) {
-    const auto of = a.logs[l].has_housing ? &Replayed::housing_degC : &Replayed::core_degC;
-    const std::vector<double> one = replayed(a, fit_a, l).*of, other = replayed(b, fit_b, l).*of;
-    for (std::size_t k = 0; k < one.size(); ++k) square += (one[k] - other[k]) * (one[k] - other[k]);
-    bins += static_cast<double>(one.size());
+    const Replayed one = replayed(a, fit_a, l), other = replayed(b, fit_b, l);
+    for (std::size_t k = 0; k < one.core_degC.size(); ++k) {
+      housing2 += std::pow(one.housing_degC[k] - other.housing_degC[k], 2);
+      core2 += std::pow(one.core_degC[k] - other.core_degC[k], 2);
+    }
+    bins += static_cast<double>(one.core_degC.size());
   }
-  return std::sqrt(square / bins);
+  return {std::sqrt(housing2 / bins), std::sqrt(core2 / bins)};
+}
+
+/// Of the housing; of the winding, where no housing was read.
+double judged_K(const Problem& problem, const Apart& a) {
+  return problem.logs.front().has_housing ? a.housing_K : a.core_K;
+}
+
+/// Of all that is read.
+double both_K(const Problem& problem, const Apart& a) {
+  const bool housing = problem.logs.front().has_housing, core = problem.any_core();
+  return std::hypot(housing ? a.housing_K : 0, core ? a.core_K : 0);
+}
+
+/// How far a load that alternates faster than rows are written may move them.
+Apart open_by_gait(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs) {
+  const auto between = [&](const auto& as, const auto& as_well) {
+    return apart(under(problem, logs, as), baseline, under(problem, logs, as_well), baseline);
+  };
+  const Apart in_step = between(told_at_crests, told_in_troughs);
+  Apart drawn2{};
+  constexpr unsigned draws = 4;
+  for (unsigned i = 0; i < draws; ++i) {
+    const auto drawn = [i](bool other) {
+      return [i, other](std::vector<double> load) { return told_somewhere(std::move(load), i, other); };
+    };
+    const Apart one = between(drawn(false), drawn(true));
+    drawn2.housing_K += one.housing_K * one.housing_K / draws;
+    drawn2.core_K += one.core_K * one.core_K / draws;
+  }
+  // Half of the way between the ends. Of three draws the ends are 0.85 standard deviations from the middle.
+  return {std::hypot(in_step.housing_K, std::sqrt(drawn2.housing_K)) / 2,
+          std::hypot(in_step.core_K, std::sqrt(drawn2.core_K)) / 2};
 }
 
 }  // namespace
@@ -179,24 +256,38 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
   const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
   const double left_K = disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K;
   double open_K = left_open_K(problem, baseline, logs, left_K);
-  if (alternates_between_rows(logs))
-    open_K = std::max(open_K, 0.5 * apart_K(under(problem, logs, told_at_crests), baseline,
-                                            under(problem, logs, told_in_troughs), baseline));
+  const bool alternates = alternates_between_rows(logs);
+  const Apart by_gait = alternates ? open_by_gait(problem, baseline, logs) : Apart{};
+  open_K = std::max(open_K, judged_K(problem, by_gait));
   // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
   const bool unknown = found.verdict == Verdict::unknown_cause;
-  const double asked_K = unknown ? left_K : apart_K(problem, baseline, problem, chosen);
+  const double asked_K = unknown ? left_K : judged_K(problem, apart(problem, baseline, problem, chosen));
   // Clean logs, rows 10 s apart or a fifth of the currents missing, left 1.3 to 2.2 times that, for it is a mean over
   // quiet stretches as well; effects outside the table in rows of a second 11 times and more.
   constexpr double times = 2.5, worth_K = 0.02;
-  if (std::min(open_K, asked_K) < worth_K || asked_K > times * open_K) return "";
+  const auto told = [](double asked, double open) { return std::min(open, asked) < worth_K || asked > times * open; };
+  std::string what;
+  double of_load_K = asked_K;
+  if (!told(asked_K, open_K)) what = unknown ? "no cause explains" : "was found beside two resistors";
+  // A winding swings by a load that rows told by chance: more than a housing, and a lag or a hot spot smooths it.
+  for (std::size_t i = 0;
+       what.empty() && both_K(problem, by_gait) > worth_K && names_causes(found.verdict) && i < chosen.chosen.size();
+       ++i) {
+    std::vector<Chosen> others = chosen.chosen;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const Apart more = apart(problem, fit(problem, others, {&chosen}), problem, chosen);
+    if (!(both_K(problem, more) < times * both_K(problem, by_gait))) continue;
+    what = fmt::format("{} explains", cause_of(chosen.chosen[i]).id);
+    of_load_K = both_K(problem, more);
+  }
+  if (what.empty()) return "";
   double apart_s = 0;
   for (const Bins& log : problem.logs) apart_s = std::max(apart_s, log.interval_s);
   return fmt::format(
       "What {}, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
       "in cells that were not measured, and when exactly moves the {} by as much; record the {} in every row and "
       "more often.",
-      unknown ? "no cause explains" : "was found beside two resistors", asked_K, apart_s,
-      problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
+      what, of_load_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
 }
 
 }  // namespace identify

@@ -228,7 +228,12 @@ void note_gaps(Log& log) {
   // Rows that are missing one by one among the others: the current that flowed in them is not known either.
   const double rows_lost =
       duration_s > 0 ? 1 - (static_cast<double>(t.size() - 1) * usual_s + lost_s + held_s) / duration_s : 0;
-  if (rows_lost > 0.1) {
+  // Where nearly all come at whole multiples of the usual, a logger drops rows; elsewhere they jitter.
+  const auto on_beat = std::count_if(spacing_s.begin(), spacing_s.end(), [&](double dt_s) {
+    return std::abs(dt_s / usual_s - std::round(dt_s / usual_s)) < 0.1;
+  });
+  const bool drops = static_cast<double>(on_beat) > 0.9 * static_cast<double>(spacing_s.size());
+  if (rows_lost > (drops ? 0.01 : 0.1)) {
     log.notes.push_back(fmt::format("About {:.0f} % of the rows are missing among the others ({:g} s apart).",
                                     100 * rows_lost, usual_s));
   }

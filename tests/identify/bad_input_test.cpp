@@ -258,6 +258,10 @@ TEST(BadInput, FortyPercentMissing) {
   refused(spoilt([&](auto& row, int number) { return row[1] = in_one_stretch(number) ? "" : row[1], true; }), untold);
 }
 
+TEST(BadInput, ASingleRowIsTooFewAndNoClockThatStands) {
+  refused(spoilt([](auto&, int row) { return row == 0; }), "only 1 row over 0.0 s");
+}
+
 TEST(BadInput, ATemperatureReadEightTimes) {
   refused(spoilt([](auto& row, int number) {
             if (number % 1200 != 0) row[3] = "";

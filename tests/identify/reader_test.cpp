@@ -410,7 +410,9 @@ TEST(Reader, TimesAsIso8601WritesThemAreUnderstood) {
   EXPECT_NEAR(time_s("2025-12-31 23:59:59 UTC", "2026-01-01 00:00:01+00:00"), 2, 1e-6);
   EXPECT_NEAR(time_s("31.12.2025 23:59:59.5", "31-Dec-2025 23:59:59.7"), 0.2, 1e-6);
   EXPECT_NEAR(time_s("0.1 sec", "0.25 sec"), 0.15, 1e-9);
-  for (const char* not_a_time : {"2025-13-01T00:00:00", "2025-06-31T00:00:00", "10:00", "noon", "2025-06-01"})
+  EXPECT_NEAR(time_s("23:59:60.5", "24:00:01"), 0.5, 1e-9) << "a leap second";
+  for (const char* not_a_time : {"2025-13-01T00:00:00", "2025-06-31T00:00:00", "10:00", "noon", "2025-06-01", "1:61.0",
+                                 "1:-5.0", "10:00:61", "10:00:-5"})
     says(complaint(head + not_a_time + ",1,20\n"), "is not a number");
 }
 
@@ -427,6 +429,23 @@ TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
         "21.11.2026 08:15:30", "21-Nov-2026 08:15:30", "11/21/2026 08:15:30 AM"})
     EXPECT_EQ(read(head + time + ",1,20\n")[0].of(Role::time).size(), 1u) << time;
   says(complaint(head + "1.5x,1,20\n"), "'1.5x' in column 'time_s' is not a number; repair it");
+}
+
+TEST(Reader, ATwentiethOfTheRowsLostAtRandomIsSaidAndJitterIsNone) {
+  std::mt19937 random(1);
+  const auto notes = [&](const std::function<double(int)>& time_s, unsigned kept_of_20) {
+    std::string rows = head;
+    for (int i = 0; i < 2000; ++i) {
+      if (random() % 20 < kept_of_20) rows += fmt::format("{:.3f},1,{}\n", time_s(i), 20 + 0.01 * i);
+    }
+    return fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
+  };
+  const auto steady = [](int i) { return 0.5 * i; };
+  const auto jittering = [&](int i) { return 0.5 * i + 0.4 * static_cast<double>(random() % 1000) / 1000; };
+  const char* lost = "of the rows are missing among the others";
+  says(notes(steady, 19), "About 5 % of the rows are missing among the others (0.5 s apart)");
+  EXPECT_EQ(notes(steady, 20).find(lost), std::string::npos);
+  EXPECT_EQ(notes(jittering, 20).find(lost), std::string::npos);
 }
 
 TEST(Reader, ACountSince1970InNoSecondsIsRefusedWithItsUnit) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <random>
 
 #include "identify/answer/answer.hpp"
@@ -427,6 +428,59 @@ TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
   const identify::Report report = identify::discover(logs, tests::ec_16());
   EXPECT_EQ(report.verdict, Verdict::insufficient);
   says(report.sentence, "may be of the load alone: it changes between rows 1 s apart");
+}
+
+/// A row in `every`, of what a bench wrote ten times a second.
+std::vector<identify::Log> one_row_in(std::size_t every, const tests::BenchOptions& options) {
+  auto logs = tests::bench_logs({options});
+  for (auto& column : logs[0].columns) {
+    for (std::size_t i = 0; every * i < column.size(); ++i) column[i] = column[every * i];
+    column.resize(column.size() / every);
+  }
+  return logs;
+}
+
+TEST(SlowReport, RowsThatAreDrawsOfAGaitHideNoLargeCause) {
+  for (const std::uint64_t seed : {1, 2}) {
+    tests::BenchOptions options;
+    options.seconds = 1800;
+    options.seed = seed;
+    double until_s = 0, hold_A = 0;
+    options.current_A = [&](double t, std::mt19937_64& random) {  // steps of 0.3 to 1 s, in spells of a minute
+      std::uniform_real_distribution<double> uniform;
+      if (t >= until_s) {
+        hold_A = hold_A > 0 ? 0 : 2 + uniform(random);
+        until_s = t + 0.3 + 0.7 * uniform(random);
+      }
+      return std::fmod(t, 120) < 60 ? hold_A : 0.0;
+    };
+    options.extra_housing_W = [&](double t, double, double housing_degC) {  // a fan from the middle on
+      return t > 900 ? -(housing_degC - options.ambient_degC) / options.motor.R2 : 0.0;
+    };
+    const identify::Report report = identify::discover(one_row_in(5, options), tests::ec_16());
+    ASSERT_FALSE(report.causes.empty()) << report.sentence;
+    EXPECT_EQ(report.causes[0].id, "cooling_change") << report.sentence;
+  }
+}
+
+TEST(SlowReport, AWindingThatFollowsWhatRowsDoNotTellIsNoLateSensor) {
+  tests::BenchOptions options;
+  options.motor = {.ohm = 0.5, .R1 = 1, .R2 = 3.5, .C1 = 12, .C2 = 160, .coupling = 2};
+  options.seconds = 5400;
+  options.core_every_s = 0.1;
+  double until_s = 60, amplitude_A = 0, Hz = 1;
+  options.current_A = [&](double t, std::mt19937_64& random) {  // gaits of 0.3 to 1.4 Hz, for minutes each
+    std::uniform_real_distribution<double> uniform;
+    if (t >= until_s) {
+      amplitude_A = amplitude_A > 0 ? 0 : 2 + 6 * uniform(random);
+      Hz = 0.3 + 1.1 * uniform(random);
+      until_s = t + 60 + 500 * uniform(random);
+    }
+    return amplitude_A * std::sin(2 * std::numbers::pi * Hz * t);
+  };
+  options.extra_housing_W = [](double, double, double) { return 2.0; };
+  const identify::Report report = identify::discover(one_row_in(5, options), std::nullopt);
+  for (const auto& cause : report.causes) EXPECT_NE(cause.id, "winding_sensor_lag") << report.sentence;
 }
 
 TEST(SlowReport, LoadsThatBeginBetweenRowsAreNoCause) {
