@@ -64,7 +64,6 @@ double winding_of_housing(const Found& found) {
   for (const Fit* f : fits) most = std::max(most, physical(f->x).C1_J_per_K / physical(f->x).C2_J_per_K);
   return most;
 }
-constexpr double heaviest_winding = C1_of_C2.most * beyond_catalogues;
 
 /// Nor is a housing in air that settles within this: of motors of 4 mm, the smallest sold, it takes a minute.
 constexpr double fastest_housing_s = 20;
@@ -92,12 +91,9 @@ std::string far_too_fast(const Problem& problem, const Found& found, const std::
 /// housing is mounted on, no sheet knows; but that makes it heavier, and cools it.
 std::string unlike_the_sheet(const Problem& problem, const Found& found) {
   if (!problem.belief.known) return "";
-  // Where something else is wrong, what heats slowly may pass for a winding: masses change places. Windings shipped are
-  // within a factor of two of their sheet. A hot spot beside it may be the winding, and what is heavy its teeth.
-  constexpr double much = 5;
+  // Where something else is wrong, what heats slowly may pass for a winding: masses change places.
   const ParameterLine C1 = base_lines(problem, found.chosen.fit, std::max(1.0, found.chosen.fit.ratio()))[2];
-  const bool none_faster = coordinate_of(found.chosen.fit, Edit::hot_spot) < 0;
-  if (!found.chosen.fit.chosen.empty() && none_faster && C1.determined && C1.value > much * problem.belief.C1_J_per_K)
+  if (!found.chosen.fit.chosen.empty() && C1.determined && !holds_a_winding(problem, found.chosen.fit))
     return fmt::format(
         "Beside {} the winding would take up {:.3g} J/K, {:.2g} times its sheet: another mass stands in its place. "
         "Read the winding{}, or see whether {} is this motor.",
@@ -309,7 +305,8 @@ std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
     for (const Start& start : log.starts) paused += start.paused;
     if (const double share = static_cast<double>(paused) / static_cast<double>(log.bins.size()); share > most_missing)
       return fmt::format(
-          "{}: nothing tells the heat input for {:.0f} % of its time; record it again, or, where its parts are recordings "
+          "{}: nothing tells the heat input for {:.0f} % of its time; record it again, or, where its parts are "
+          "recordings "
           "of their own, tell them apart by a column (--column session=NAME).",
           log.name, 100 * share);
     double low = 1e300, high = -1e300;
@@ -405,6 +402,11 @@ std::string masses_in_each_others_place(const Problem& problem, const Found& fou
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",
         share);
+  if (names_causes(found.verdict) && !problem.belief.known && !holds_a_winding(problem, found.chosen.fit))
+    return fmt::format(
+        "Beside {} the winding would take up more heat than any housing: another mass stands in its place. Say which "
+        "motor this is (--motor).",
+        fmt::join(names_of(found.chosen.fit.chosen), " and "));
   const std::string fast = far_too_fast(problem, found, logs);
   return fast.empty() ? unlike_the_sheet(problem, found) : fast;
 }

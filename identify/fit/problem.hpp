@@ -17,6 +17,7 @@ struct InCatalogues {
 };
 inline constexpr InCatalogues R1_of_R2{0.03, 0.2, 1.4}, C1_of_C2{0.02, 0.11, 0.6};
 inline constexpr double beyond_catalogues = 3;  // so many times as far is believed of a motor either way
+inline constexpr double heaviest_winding = C1_of_C2.most * beyond_catalogues;  // of its housing, J/K over J/K
 
 /// Where the fit starts and how far it may be off.
 struct Belief {

@@ -64,6 +64,9 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   if (!(more > margins.second))
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
+  if (holds_a_winding(problem, single.fit) && !holds_a_winding(problem, pair.fit))
+    return fmt::format("{} would gain {:.1f} more, but none of its masses is this motor's winding: stopped at {}.",
+                       both, more, first);
   const double moved = moved_K(problem, pair.fit, single.fit);
   if (moved < std::max(margins.noticeable_K, of_current_K(problem, margins)))
     return fmt::format(
@@ -426,6 +429,17 @@ const char* word(Verdict v) {
       return "insufficient";
   }
   return "insufficient";
+}
+
+bool holds_a_winding(const Problem& problem, const Fit& f) {
+  const Physical p = physical(f.x);
+  const int spot = coordinate_of(f, Edit::hot_spot);
+  if (!problem.belief.known) return spot < 0 || p.C1_J_per_K <= heaviest_winding * p.C2_J_per_K;
+  constexpr double much = 5;
+  const double sheet_J_per_K = problem.belief.C1_J_per_K;
+  return p.C1_J_per_K <= much * sheet_J_per_K ||
+         (spot >= 0 &&
+          much * parameter_value(problem, causes()[cause_named("hot_spot")], 0, f.x[spot]) > sheet_J_per_K);
 }
 
 Found search(const Problem& given, const Margins& margins, const std::vector<std::string>& without, const Tell& doing) {

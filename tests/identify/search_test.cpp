@@ -20,6 +20,7 @@
 #include "identify/answer/baseline.hpp"
 #include "identify/answer/experiment.hpp"
 #include "identify/answer/model_file.hpp"
+#include "identify/answer/refusals.hpp"
 #include "identify/discover.hpp"
 #include "identify/fit/leeway.hpp"
 #include "identify/fit/parallel.hpp"
@@ -708,6 +709,34 @@ TEST(SlowSearch, NoCauseStaysInAPoorValleyThatTwoResistorsHaveLeft) {
       << "two others, where fifteen times what is typical counts as impossible";
   for (const identify::Candidate& single : found.singles)
     EXPECT_GT(single.evidence, -20) << identify::names_of(single.fit.chosen).front() << "; seven had -578 to -625";
+}
+
+TEST(Search, AWindingIsOneOfItsMasses) {
+  Problem problem;
+  const auto motor = [&](double C1_J_per_K, double C2_J_per_K) {
+    identify::Fit f;
+    f.x = Eigen::Vector4d{problem.belief.R1_K_per_W, problem.belief.R2_K_per_W, C1_J_per_K, C2_J_per_K}.array().log();
+    return f;
+  };
+  const auto beside_hot_spot = [&](double C1_J_per_K, double C2_J_per_K, double spot_J_per_K) {
+    return with_cause(motor(C1_J_per_K, C2_J_per_K), "hot_spot",
+                      {std::log(spot_J_per_K / problem.belief.C1_J_per_K), 0});
+  };
+  problem.belief.known = true;  // 10 J/K
+  EXPECT_TRUE(holds_a_winding(problem, motor(45, 200)));
+  EXPECT_FALSE(holds_a_winding(problem, motor(55, 200)));
+  EXPECT_TRUE(holds_a_winding(problem, beside_hot_spot(45, 200, 1)));
+  EXPECT_TRUE(holds_a_winding(problem, beside_hot_spot(70, 200, 3))) << "the spot is the winding";
+  EXPECT_FALSE(holds_a_winding(problem, beside_hot_spot(70, 200, 1)));
+  problem.belief.known = false;
+  EXPECT_TRUE(holds_a_winding(problem, motor(1600, 13))) << "columns may be swapped: refused elsewhere";
+  EXPECT_TRUE(holds_a_winding(problem, beside_hot_spot(20, 13, 78)));
+  EXPECT_FALSE(holds_a_winding(problem, beside_hot_spot(1600, 13, 78)));
+
+  identify::Found found;
+  found.verdict = Verdict::explained;
+  found.baseline.fit = found.chosen.fit = beside_hot_spot(1600, 13, 78);
+  says(masses_in_each_others_place(problem, found, {}, std::nullopt), "Say which motor this is (--motor)");
 }
 
 TEST(Search, WindingAndHousingAreNotExchangedWhereTheSheetIsFarOff) {
