@@ -64,7 +64,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   if (!(more > margins.second))
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
-  if (holds_a_winding(problem, single.fit) && !holds_a_winding(problem, pair.fit))
+  if (problem.belief.known && holds_a_winding(problem, single.fit) && !holds_a_winding(problem, pair.fit))
     return fmt::format("{} would gain {:.1f} more, but none of its masses is this motor's winding: stopped at {}.",
                        both, more, first);
   const double moved = moved_K(problem, pair.fit, single.fit);
