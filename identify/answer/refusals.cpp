@@ -306,8 +306,7 @@ std::string too_poor(const Problem& problem, const std::vector<Log>& logs) {
     if (const double share = static_cast<double>(paused) / static_cast<double>(log.bins.size()); share > most_missing)
       return fmt::format(
           "{}: nothing tells the heat input for {:.0f} % of its time; record it again, or, where its parts are "
-          "recordings "
-          "of their own, tell them apart by a column (--column session=NAME).",
+          "recordings of their own, tell them apart by a column (--column session=NAME).",
           log.name, 100 * share);
     double low = 1e300, high = -1e300;
     for (const Bin& bin : log.bins) {

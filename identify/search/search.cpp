@@ -64,6 +64,7 @@ std::string why_no_pair(const Problem& problem, bool counted, const Field& field
   if (!(more > margins.second))
     return fmt::format("A further cause would gain {:.1f} at most, less than {:.0f}: stopped at {}.", more,
                        margins.second, first);
+  // Without a sheet such a pair may still foretell best: a traction motor's iron and teeth (SlowTraction, 37).
   if (problem.belief.known && holds_a_winding(problem, single.fit) && !holds_a_winding(problem, pair.fit))
     return fmt::format("{} would gain {:.1f} more, but none of its masses is this motor's winding: stopped at {}.",
                        both, more, first);

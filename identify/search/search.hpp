@@ -78,11 +78,12 @@ inline constexpr double veto_share = 0.25;
 
 enum class Verdict { adequate, explained, partly_explained, ambiguous, unknown_cause, insufficient };
 const char* word(Verdict verdict);
+/// Of the whole or of most of it.
+inline bool names_causes(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
+
 /// Is one of its masses a winding? Those shipped are within a factor of two of their sheet; a hot spot may be the
 /// winding, and what is heavy its teeth. Without a sheet: a winding heavier than any housing beside a hot spot is none.
 bool holds_a_winding(const Problem& problem, const Fit& fit);
-/// Of the whole or of most of it.
-inline bool names_causes(Verdict v) { return v == Verdict::explained || v == Verdict::partly_explained; }
 
 struct Found {
   Fit plain_baseline;  // without leeway, to the noise of the recording
