@@ -321,6 +321,7 @@ TEST(Image, AGateDriverFaultOpensTheBridgeWithoutASingleInstruction) {
     hold(*pcb, 4.0f, 4.0f, 0.05);
     EXPECT_FALSE(pcb->duty(axis).on) << "it must not come back by itself";
     EXPECT_EQ(pcb->door().axis[axis].mode, firmware::Mode::tripped);
+    EXPECT_EQ(pcb->door().axis[axis].fault.fault, wire::Fault::invalid_sample) << "not because no current comes";
     EXPECT_TRUE(pcb->duty(1 - axis).on);
     NO_TROUBLE(*pcb);
   }

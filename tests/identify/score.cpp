@@ -197,8 +197,10 @@ struct Arguments {
   identify::Margins margins;
 };
 
-/// A row's logs, one after the other.
+/// A row's logs, one after the other. Where few are drawn, each row draws its own: the same motors with the same causes in
+/// all rows would be bad luck four times over, and chance is counted for logs that do not know of each other.
 std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
+  const std::uint64_t first = a.first + (a.at_most > 0 ? 10'000 * static_cast<std::uint64_t>(&row - rows().data()) : 0);
   std::vector<tests::CaseOptions> out;
   for (int s = 0; s < a.seeds * std::max(1, row.per_seed); ++s) {
     for (const auto& effects : effects_of(row.hidden)) {
@@ -216,7 +218,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
       c.log.small_ones = row.hidden == Hidden::dominant;
       std::uint64_t mixed = 0;
       for (const char letter : tests::joined(effects)) mixed = mixed * 131 + static_cast<unsigned char>(letter);
-      c.log.seed = (a.first + static_cast<std::uint64_t>(s)) * 1000 + mixed % 997;
+      c.log.seed = (first + static_cast<std::uint64_t>(s)) * 1000 + mixed % 997;
       if (row.hidden == Hidden::removed) c.removed = effects;
       if (!a.remove.empty()) c.removed.push_back(a.remove);
       c.margins = a.margins;
@@ -228,7 +230,7 @@ std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
     }
   }
   if (a.at_most > 0 && row.hidden != Hidden::nothing && out.size() > static_cast<std::size_t>(a.at_most)) {
-    std::mt19937_64 random(a.first);
+    std::mt19937_64 random(first);
     for (std::size_t i = out.size() - 1; i > 0; --i) std::swap(out[i], out[random() % (i + 1)]);
     out.resize(static_cast<std::size_t>(a.at_most));
   }
@@ -377,7 +379,7 @@ int main(int argc, char** argv) {
   });
   app.add_flag("--list", list, "the rows");
   app.add_option("--seeds", a.seeds, "logs for each hidden thing")->capture_default_str();
-  app.add_option("--at-most", a.at_most, "logs of a row that hides something, drawn by the first seed");
+  app.add_option("--at-most", a.at_most, "logs of a row that hides something, drawn by the first seed and other in each row");
   app.add_option("--first", a.first, "first seed")->capture_default_str();
   app.add_option("--only", a.only, "one cause");
   app.add_option("--remove", a.remove, "take a cause out of the table");
