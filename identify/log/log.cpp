@@ -101,7 +101,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
                 ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
   check_alone(log, found);
   check_epoch(log, time[rows.front()]);
-  if (table.of_day[time_column]) pass_midnights(log);
+  if (table.of_day[time_column] || counts_from_midnight(table.names[time_column])) pass_midnights(log);
   check_time(table, log, rows);
   spread_shared_times(log);
   const double start_s = log.of(Role::time).front();

@@ -486,6 +486,24 @@ TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
   const identify::Table table =
       identify::read_table(file("note\ttime_s\tcurrent_A\tcore_degC\n\t0\t1\t\n\t1\t2\t20\n"));
   EXPECT_EQ(table.names.size(), 4u);
+TEST(Reader, MillisecondsOfADayPassMidnight) {
+  // As VESC's ms_today.
+  ColumnMap map;
+  add_column(map, "time_s=ms_today:ms");
+  const auto logs = read("ms_today,current_A,housing_degC\n86399000,1,20\n86399500,1,20\n0,1,21\n500,1,21\n", map);
+  EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 0.5, 1, 1.5}));
+  says(fmt::format("{}", fmt::join(logs[0].notes, " ")), "passes midnight 1 time");
+  says(complaint(head + "86399,1,20\n86399.5,1,20\n0,1,21\n0.5,1,21\n"), "two recordings joined");
+  says(complaint("ms_today,current_A,housing_degC\n5000000,1,20\n6000000,1,20\n0,1,21\n500,1,21\n", map),
+       "two recordings joined");
+}
+
+TEST(Reader, AClockThatWouldRunForYearsIsAskedForItsUnit) {
+  // As PX4's timestamp, in microseconds since it was switched on.
+  says(complaint("timestamp,current_A,housing_degC\n12345678,1,20\n1212345678,1,21\n"),
+       "it would last 13889 days, as no recording does; say in what its time counts, --column time_s=timestamp:us");
+}
+
   EXPECT_EQ(table.rows(), 2u);
 }
 
