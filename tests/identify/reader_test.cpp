@@ -187,6 +187,10 @@ TEST(Reader, AnOwnNameInAnotherUnitIsKnownByItsName) {
   EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
   EXPECT_NEAR(log.of(Role::speed)[0], 6.283185307, 1e-9);
   says(log.notes.front(), "current_A in mA");
+  const Log small = read("time_s,current_ma,housing_deg_f,speed_rad_s\n0,1000,50,60\n1,2000,212,60\n")[0];
+  EXPECT_DOUBLE_EQ(small.of(Role::current)[1], 2);
+  EXPECT_NEAR(small.of(Role::housing)[1], 100, 1e-9);
+  EXPECT_EQ(small.of(Role::speed)[0], 60);
   EXPECT_DOUBLE_EQ(read("time_s,current_A,current_mA,housing_degC\n0,1,7,20\n1,2,7,21\n")[0].of(Role::current)[1], 2);
   says(complaint("time_s,current_mA,current_kA,housing_degC\n0,1,7,20\n"),
        "columns 'current_mA' and 'current_kA' may both be current_A");
@@ -1217,6 +1221,10 @@ TEST(Masks, ASensorOfWholeDegreesIsReadAsItSteps) {
     }
     EXPECT_GT(readings, 60);
     EXPECT_LT(std::sqrt(sum / readings), 0.15) << noise_K << ": what is believed of such a reading";
+  for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
+  for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
+  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
+  EXPECT_EQ(factor("current_A", "ma"), 1e-3);
     ASSERT_FALSE(log.notes.empty());
     says(log.notes.back(), "moves in steps of 1 K");
   }
