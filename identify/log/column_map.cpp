@@ -292,9 +292,10 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
           "is not the one in {} (units: {}).",
           told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
     else if (role == Role::speed && named_electrical(source.column))
-      notes.push_back(
-          fmt::format("Column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs.",
-                      source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
+      refuse_data(fmt::format(
+          "{}: column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs, or its unit "
+          "alone if they are the shaft's.",
+          table.file, source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
     else if (unit.empty() && role == Role::speed && source.column != own_name(role))
       notes.push_back(
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "

@@ -36,7 +36,7 @@ const char* rms_unit(Role role) {
   return role == Role::current ? ":1.2247A" : role == Role::iq || role == Role::id ? ":1.4142A" : "";
 }
 
-bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "electric"); }
+bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "elec"); }
 
 namespace {
 

@@ -810,11 +810,20 @@ TEST(Reader, ATemperatureWithoutAUnitBesideOthersInFahrenheitIsAskedFor) {
 TEST(Reader, AnAmplitudeWithoutTheOtherIsToldWithItsColumn) {
   ColumnMap map;
   add_column(map, "iq_A=motor_iq");
-  add_column(map, "speed_rad_per_s=erpm");
-  const auto notes = read("time_s,motor_id,motor_iq,erpm,housing_degC\n0,1,1,0,20\n1,2,2,7,21\n", map)[0].notes;
-  const std::string said = fmt::format("{}", fmt::join(notes, " "));
-  says(said, "say --column id_A=motor_id");
-  says(said, "say --column speed_rad_per_s=erpm:0.1429rpm of a motor of seven pole pairs");
+  const auto notes = read("time_s,motor_id,motor_iq,housing_degC\n0,1,1,20\n1,2,2,21\n", map)[0].notes;
+  says(fmt::format("{}", fmt::join(notes, " ")), "say --column id_A=motor_id");
+}
+
+TEST(Reader, TurnsOfTheFieldAreNoTurnsOfTheShaft) {
+  for (const std::string name : {"erpm", "eRPM", "elec_freq_Hz", "electrical_speed"}) {
+    const std::string rows = "time_s,current_A," + name + ",housing_degC\n0,1,0,20\n1,2,7,21\n";
+    ColumnMap map;
+    add_column(map, "speed_rad_per_s=" + name);
+    says(complaint(rows, map), "counts turns of the field; say --column speed_rad_per_s=" + name + ":0.1429rpm");
+    ColumnMap said;
+    add_column(said, "speed_rad_per_s=" + name + ":0.5rpm");
+    EXPECT_NEAR(read(rows, said)[0].of(Role::speed)[1], 3.5 * M_PI / 30, 1e-9);
+  }
 }
 
 TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
