@@ -30,7 +30,7 @@ void check_normalised(const Log& log) {
     for (const Role role : roles) largest = std::max(largest, largest_magnitude(log.of(role)));
     return largest > 0 && largest <= most;
   };
-  const auto moves = [&](Role role) { return largest_magnitude(spacing(log.of(role))) > 0; };
+  const auto moves = [&](Role role) { return count_told(log.of(role)) > 0 && !stands(log.of(role)); };
   if (told_small(temperatures) && told_small(load_roles) &&
       std::any_of(std::begin(temperatures), std::end(temperatures), moves))
     refuse_data(

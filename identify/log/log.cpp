@@ -82,13 +82,13 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
       log.notes.push_back(fmt::format("Column '{}' shows negative numbers without their sign, {:.0f} for -1; read so.",
                                       source.column, std::exp2(bits) - 1));
     for (double& x : to) x = source.factor * (x + source.offset);
-    // A sensor that is not connected; 0 degC all along, and not by a hundredth otherwise, is no weather.
+    // A sensor that is not connected; 0 degC or -1 all along, and not by a hundredth otherwise, is no weather.
     const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
-                           count_told(to) > 1 && largest_magnitude(to) == 0;
+                           count_told(to) > 1 && stands(to) && (lowest(to) == 0 || lowest(to) == -1);
     if (unplugged) {
+      log.notes.push_back(fmt::format("{} is {:g} in all rows, as of a sensor that is not connected, and was left out.",
+                                      own_name(role), lowest(to)));
       to.clear();
-      log.notes.push_back(
-          fmt::format("{} is 0 in all rows, as of a sensor that is not connected, and was left out.", own_name(role)));
     } else if (count_told(to) == 0) {
       to.clear();
       log.notes.push_back(

@@ -328,6 +328,12 @@ double largest_magnitude(const std::vector<double>& cells) {
   return most;
 }
 
+bool stands(const std::vector<double>& cells) {
+  double low = missing, high = missing;  // fmin and fmax pass over what is missing
+  for (const double x : cells) low = std::fmin(low, x), high = std::fmax(high, x);
+  return low == high;
+}
+
 std::vector<double> spacing(const std::vector<double>& cells) {
   std::vector<double> out;
   for (std::size_t i = 1; i < cells.size(); ++i) out.push_back(cells[i] - cells[i - 1]);

@@ -21,6 +21,9 @@ namespace identify {
 std::size_t count_told(const std::vector<double>& cells);
 double largest_magnitude(const std::vector<double>& cells);
 
+/// Does each cell that is not missing say the same? Not of none.
+bool stands(const std::vector<double>& cells);
+
 /// From each cell to the next, one fewer.
 std::vector<double> spacing(const std::vector<double>& cells);
 

@@ -323,6 +323,13 @@ TEST(Reader, ASensorThatReadsNothingButZeroIsLeftOut) {
   says(log.notes[0], "ambient_degC is 0 in all rows, as of a sensor that is not connected, and was left out.");
 }
 
+TEST(Reader, ASensorThatReadsNothingButMinusOneIsLeftOut) {
+  const auto logs = read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,-1\n1,2,21,-1\n");
+  EXPECT_FALSE(logs[0].has(Role::ambient));
+  says(fmt::format("{}", fmt::join(logs[0].notes, " ")), "ambient_degC is -1 in all rows, as of a sensor that is not");
+  EXPECT_TRUE(read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,\n2,2,21,9\n")[0].has(Role::ambient));
+}
+
 TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 0.2);
