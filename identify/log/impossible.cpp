@@ -129,13 +129,23 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: say how warm the room was, "
                     "--ambient DEGC, or record it; if this is Fahrenheit say {3}.",
                     log.name, own_name(motor_at), lowest(log.of(motor_at)), column_in(log, motor_at, "degF")));
+  // Beside a meter's offset and noise.
+  constexpr double clearly = 0.05, often = 0.01;
+  const std::vector<double>& power = log.of(Role::power);
+  const double below_W = -clearly * largest_magnitude(power);
+  const auto negative = std::count_if(power.begin(), power.end(), [&](double W) { return W < below_W; });
+  if (static_cast<double>(negative) > often * static_cast<double>(count_told(power)))
+    refuse_data(fmt::format(
+        "{}: power_W is negative in {} rows, as what heats a winding never is: this is what the shaft or the supply "
+        "gives and takes; map the current instead, or the loss alone.",
+        log.name, negative));
   const double most_A = most_current_A(motor);
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A)
       refuse_data(
           fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say "
-                      "{4}, if it is another quantity map the right column.",
+                      "{4} (or what one is worth), if it is another quantity map the right column.",
                       log.name, own_name(role), peak, most_A, column_in(log, role, "mA")));
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");

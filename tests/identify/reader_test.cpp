@@ -896,6 +896,16 @@ TEST(Reader, TheIndexThatPandasWritesHasAName) {
 }
 
 TEST(Reader, AColumnMappedToOneRoleIsNotReadAsAnotherByItsOwnName) {
+TEST(Reader, APowerThatIsNegativeIsNoHeat) {
+  std::string text = "time_s,power_W,housing_degC\n", meter = text;
+  for (int i = 0; i < 50; ++i) {
+    text += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -8 : 20, 20 + i);
+    meter += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -0.2 : 20, 20 + i);
+  }
+  says(complaint(text), "power_W is negative in 10 rows, as what heats a winding never is");
+  EXPECT_TRUE(read(meter)[0].has(Role::power));
+}
+
   ColumnMap map;
   identify::add_column(map, "core_degC=housing_degC");
   const Log log = read(head + "0,1,20\n1,2,21\n", map)[0];
