@@ -486,17 +486,6 @@ TEST(Reader, AClockThatPassesMidnightGoesOn) {
   says(complaint(head + "86399,1,20\n1,1,20\n"), "time runs backwards");
 }
 
-TEST(Reader, ARowWrittenTwiceCountsOnce) {
-  const Log log = read(head + "0,1,20\n1,1,20\n1,1,20\n1,1,20\n1,1,21\n2,1,21\n")[0];
-  EXPECT_EQ(log.of(Role::time).size(), 4u);
-  ASSERT_FALSE(log.notes.empty());
-  says(log.notes[0], "Rows that are the same as the row before were left out: 2.");
-}
-
-TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
-  const identify::Table table =
-      identify::read_table(file("note\ttime_s\tcurrent_A\tcore_degC\n\t0\t1\t\n\t1\t2\t20\n"));
-  EXPECT_EQ(table.names.size(), 4u);
 TEST(Reader, MillisecondsOfADayPassMidnight) {
   // As VESC's ms_today.
   ColumnMap map;
@@ -515,6 +504,17 @@ TEST(Reader, AClockThatWouldRunForYearsIsAskedForItsUnit) {
        "it would last 13889 days, as no recording does; say in what its time counts, --column time_s=timestamp:us");
 }
 
+TEST(Reader, ARowWrittenTwiceCountsOnce) {
+  const Log log = read(head + "0,1,20\n1,1,20\n1,1,20\n1,1,20\n1,1,21\n2,1,21\n")[0];
+  EXPECT_EQ(log.of(Role::time).size(), 4u);
+  ASSERT_FALSE(log.notes.empty());
+  says(log.notes[0], "Rows that are the same as the row before were left out: 2.");
+}
+
+TEST(Reader, AnEmptyFirstOrLastCellBetweenTabsIsACell) {
+  const identify::Table table =
+      identify::read_table(file("note\ttime_s\tcurrent_A\tcore_degC\n\t0\t1\t\n\t1\t2\t20\n"));
+  EXPECT_EQ(table.names.size(), 4u);
   EXPECT_EQ(table.rows(), 2u);
 }
 
@@ -850,10 +850,42 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
        "--column power_W=\"Power (W)\" if that is what heats the winding");
 }
 
+TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
+  // As VESC, ArduPilot, ODrive and Talon call theirs; the motor's sensor is not connected in the first two.
+  const std::string vesc = complaint("ms_today,temp_mos_max,temp_motor,current_motor\n0,20,-1,1\n1,30,-1,2\n");
+  says(vesc, "--column housing_degC=temp_motor, which says -1 in all rows: see whether its sensor is connected");
+  says(complaint("TimeUS,Curr,Temp,MotTemp\n0,1,20,0\n1,2,30,0\n"), "--column housing_degC=MotTemp");
+  says(complaint("time_s,current_A,fet_thermistor.temperature,motor_thermistor.temperature\n0,1,20,20\n1,2,30,21\n"),
+       "--column housing_degC=motor_thermistor.temperature");
+  says(complaint("time_s,current_A,esc_temperature\n0,1,20\n1,2,30\n"), "--column housing_degC=NAME");
+  const std::string talon = complaint("time_s,SupplyCurrent,StatorCurrent,DeviceTemp\n0,1,1,20\n1,2,3,21\n");
+  says(talon, "--column current_A=StatorCurrent");
+  says(talon, "--column housing_degC=DeviceTemp");
+  says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
+}
+
+TEST(Reader, AGuessIsOfOneMotor) {
+  // As PX4 and Unitree number theirs.
+  const std::string esc = complaint(
+      "timestamp,esc[0].esc_current,esc[0].motor_temperature,esc[1].esc_current,esc[1].motor_temperature,esc[1].esc_"
+      "rpm\n"
+      "0,1,0,2,20,9\n1,2,0,3,21,10\n");
+  says(esc, "--column current_A=\"esc[0].esc_current\"");
+  says(esc, "--column housing_degC=\"esc[0].motor_temperature\"");
+  const std::string joints = complaint(
+      "time_s,motor_0_temperature_0,motor_1_dq,motor_1_tau_est,motor_1_temperature_0\n0,20,1,1,20\n1,21,2,2,21\n");
+  for (const char* column :
+       {"torque_Nm=motor_1_tau_est", "housing_degC=motor_1_temperature_0", "speed_rad_per_s=motor_1_dq"})
+    says(joints, std::string("--column ") + column);
+  // A column that is read now and then moves all the same.
+  says(complaint("time_s,current_A,temp_1,temp_2\n0,1,20,20\n1,2,20,\n2,2,20,21\n3,2,20,\n"),
+       "--column housing_degC=temp_2");
+}
+
 TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string rows = "time_s,current_A,housing_degC,velocity,T_winding,motor\n0,1,20,0,20,1\n1,2,21,9,30,1\n";
   const std::string notes = fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
-  says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm)");
+  says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm or :rev/s)");
   says(notes, "say --column core_degC=T_winding.");
   const std::string core_only = "time_s,current_A,core_degC,T_case,n_rpm\n0,1,20,20,0\n1,2,21,21,9\n";
   const std::string told = fmt::format("{}", fmt::join(read(core_only)[0].notes, " "));
@@ -862,6 +894,16 @@ TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string of_a_car =
       fmt::format("{}", fmt::join(read("time_s,current_A,housing_degC,speed_mps\n0,1,20,0\n1,2,21,9\n")[0].notes, " "));
   EXPECT_EQ(of_a_car.find("speed_mps"), std::string::npos) << "metres a second are no motor's";
+}
+
+TEST(Reader, APowerThatIsNegativeIsNoHeat) {
+  std::string text = "time_s,power_W,housing_degC\n", meter = text;
+  for (int i = 0; i < 50; ++i) {
+    text += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -8 : 20, 20 + i);
+    meter += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -0.2 : 20, 20 + i);
+  }
+  says(complaint(text), "power_W is negative in 10 rows, as what heats a winding never is");
+  EXPECT_TRUE(read(meter)[0].has(Role::power));
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
@@ -896,16 +938,6 @@ TEST(Reader, TheIndexThatPandasWritesHasAName) {
 }
 
 TEST(Reader, AColumnMappedToOneRoleIsNotReadAsAnotherByItsOwnName) {
-TEST(Reader, APowerThatIsNegativeIsNoHeat) {
-  std::string text = "time_s,power_W,housing_degC\n", meter = text;
-  for (int i = 0; i < 50; ++i) {
-    text += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -8 : 20, 20 + i);
-    meter += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -0.2 : 20, 20 + i);
-  }
-  says(complaint(text), "power_W is negative in 10 rows, as what heats a winding never is");
-  EXPECT_TRUE(read(meter)[0].has(Role::power));
-}
-
   ColumnMap map;
   identify::add_column(map, "core_degC=housing_degC");
   const Log log = read(head + "0,1,20\n1,2,21\n", map)[0];
@@ -1189,6 +1221,10 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   for (const char* rpm : {"RPM", "Rpm", "rpm", "1/min", "min-1"})
     EXPECT_NEAR(factor("speed_rad_per_s", rpm), 0.104719755, 1e-9);
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
+  for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
+  for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
+  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
+  EXPECT_EQ(factor("current_A", "ma"), 1e-3);
   EXPECT_EQ(factor("time_s", "ns"), 1e-9);
   for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
   for (const char* mohm : {"mohm", "mΩ", "mΩ"}) EXPECT_EQ(factor("winding_ohm", mohm), 1e-3);
@@ -1247,10 +1283,6 @@ TEST(Masks, ASensorOfWholeDegreesIsReadAsItSteps) {
     }
     EXPECT_GT(readings, 60);
     EXPECT_LT(std::sqrt(sum / readings), 0.15) << noise_K << ": what is believed of such a reading";
-  for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
-  for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
-  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
-  EXPECT_EQ(factor("current_A", "ma"), 1e-3);
     ASSERT_FALSE(log.notes.empty());
     says(log.notes.back(), "moves in steps of 1 K");
   }
