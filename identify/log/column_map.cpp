@@ -299,7 +299,7 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     else if (unit.empty() && role == Role::speed && source.column != own_name(role))
       notes.push_back(
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
-                      "in revolutions a minute.",
+                      "in revolutions a minute, :rev/s if in turns a second.",
                       source.column, own_name(role), for_a_shell(source.column + ":rpm")));
     if (unit.empty() && std::count(std::begin(temperatures), std::end(temperatures), role) > 0)
       ask_for_the_unit(table, source.column, role);

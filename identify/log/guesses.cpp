@@ -93,7 +93,8 @@ bool of_a_controller(const std::string& name) {
 
 /// What was asked for, beside what is: Iq_setpoint and Iq_measured.
 bool is_commanded(const std::string& name) {
-  return has_any(name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max"});
+  return has_any(
+      name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max", "error"});
 }
 
 /// Do numbers in its name tell another motor than those in another's? esc[1].temperature beside esc[0].current does.
