@@ -74,6 +74,20 @@ TEST(Map, EachThatComesAlongIsReadAndTheOneOfSessionsTellsThePeriod) {
   }
 }
 
+TEST(Map, OfVescToolReadsItsLog) {
+  // A part of its columns; each line ends in a separator, and a day within the log.
+  ColumnMap map = identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/vesc.toml");
+  add_column(map, "speed_rad_per_s=erpm:0.1429rpm");
+  const Log log = read(
+      "ms_today;input_voltage;temp_mos_max;temp_motor;current_motor;current_in;d_axis_current;q_axis_current;erpm;\n"
+      "86399900;24.0;25.0;24.5;-2.5;0.3;0.01;-2.5;-700;\n0;24.0;26.0;24.6;3.0;0.4;0.01;3.0;7000;\n",
+      map)[0];
+  EXPECT_NEAR(log.of(Role::time)[1], 0.1, 1e-9);
+  EXPECT_EQ(log.of(Role::iq), (std::vector<double>{-2.5, 3}));
+  EXPECT_EQ(log.of(Role::housing)[1], 24.6);
+  EXPECT_NEAR(log.of(Role::speed)[1], 1000.3 * M_PI / 30, 1e-9);
+}
+
 TEST(Reader, RowsWithoutATimeFollowEachOtherByThePeriodThatIsSaidInEachSession) {
   ColumnMap map;
   map.period_s = 0.5;
