@@ -109,11 +109,15 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
           fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say {} (or "
                       "what one is worth).",
                       log.name, own_name(role), low, column_in(log, role, "0.01degC")));
-    if (low > 200)
-      refuse_data(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say {}.", log.name,
-                              own_name(role), low, column_in(log, role, "K")));
-    // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
-    // not.
+    // A motor that is measured begins above -23 degC and stays below 200; a room is 10..45 degC, which reads 50..113 in
+    // Fahrenheit.
+    const bool kelvin = low > 250 && largest_magnitude(log.of(role)) < 473;
+    if (low > 200 || (role == Role::ambient && low > 113))
+      refuse_data(fmt::format(
+          "{}: {} never falls below {:.0f}, which looks like {}.", log.name, own_name(role), low,
+          kelvin ? fmt::format("kelvin; say {} (or :0.1degC of tenths of a degree)", column_in(log, role, "K"))
+                 : fmt::format("tenths of a degree; say {}", column_in(log, role, "0.1degC"))));
+    // Coolant and motors may truly be that warm, a room may not.
     if (role == Role::ambient && low > 55)
       refuse_data(
           fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say {} (and the same "

@@ -1083,6 +1083,12 @@ TEST(Reader, HousingAndWindingSwappedAreRecognised) {
   double core = 25, housing = 25;
   for (int i = 0; i < 600; ++i) {
     const double current = (i / 37) % 2 == 0 ? 3 : 0;
+TEST(Reader, TenthsOfADegreeAreNoKelvin) {
+  says(complaint(head + "0,1,239\n1,1,331\n"),
+       "looks like tenths of a degree; say --column housing_degC=housing_degC:0.1degC");
+  says(complaint(head + "0,1,281\n1,1,731\n"), "looks like tenths of a degree");
+  says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,192,188\n1,1,331,189\n"), "ambient_degC:0.1degC");
+}
     for (std::string* text : {&right, &swapped}) {
       *text += std::to_string(i) + "," + std::to_string(current) + "," + std::to_string(housing) + "," +
                std::to_string(core) + "\n";
