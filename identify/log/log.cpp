@@ -194,9 +194,11 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   const auto first_of = [&](std::initializer_list<Role> roles) {
     return index_of(table, found.at(*std::find_if(roles.begin(), roles.end(), has)));
   };
-  const std::string several = several_motors(
-      table, first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
-      first_of({Role::housing, Role::core}), known);
+  const bool one_clock = has(Role::time) && !has(Role::session);
+  const std::string several =
+      several_motors(table, one_clock ? table.columns[first_of({Role::time})] : std::vector<double>(),
+                     first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
+                     first_of({Role::housing, Role::core}), known);
   if (!several.empty()) refuse_data(several);
   const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
   const std::vector<Session> sessions = sessions_of(table, session);

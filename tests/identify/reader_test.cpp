@@ -643,6 +643,20 @@ TEST(Rows, OfSeveralMotorsAreRefusedAndThoseOfOneAreRead) {
   says(complaint(text, sessions), "its rows belong to several motors in turn");
 }
 
+TEST(Rows, OfMotorsOneAfterTheOtherOrOfAWholeRobotAreRefusedAsWell) {
+  std::string blocks = "time_s,joint,current_A,housing_degC\n", robot = blocks;
+  for (const char* joint : {"hip", "knee"}) {
+    for (int i = 0; i < 10; ++i) blocks += fmt::format("{},{},{},{}\n", i, joint, i % 3, 20 + i);
+  }
+  says(complaint(blocks),
+       "several motors one after the other, as column 'joint' tells (hip, knee); choose one with --rows \"joint=hip\"");
+  ColumnMap map;
+  add_column(map, "session=joint");
+  EXPECT_EQ(read(blocks, map).size(), 2u);
+  for (int i = 0; i < 29 * 6; ++i) robot += fmt::format("{},{},{},{}\n", i / 29, i % 29, i % 3, 20 + i % 29);
+  says(complaint(robot), "several motors in turn, as column 'joint' tells (0, 1, 10");
+}
+
 TEST(Rows, ACounterOfMessagesOrABitThatTogglesIsNoMotor) {
   std::string toggles = "time_s,current_A,housing_degC,alive\n", kinds = "time_s,current_A,housing_degC,id\n";
   for (int i = 0; i < 40; ++i) {
@@ -1069,6 +1083,12 @@ TEST(Reader, AHeaderInAUnitOfOneLetterIsRefusedWithTheConversion) {
   says(complaint("time_h,current_A,housing_degC\n0,1,20\n"), "--column time_s=time_h:h");
 }
 TEST(Reader, KelvinIsRecognised) { says(complaint(head + "0,1,293\n1,1,294\n"), "looks like kelvin"); }
+TEST(Reader, TenthsOfADegreeAreNoKelvin) {
+  says(complaint(head + "0,1,239\n1,1,331\n"),
+       "looks like tenths of a degree; say --column housing_degC=housing_degC:0.1degC");
+  says(complaint(head + "0,1,281\n1,1,731\n"), "looks like tenths of a degree");
+  says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,192,188\n1,1,331,189\n"), "ambient_degC:0.1degC");
+}
 TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
   says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,70,70\n1,1,71,70\n"), "looks like Fahrenheit");
 }
@@ -1083,12 +1103,6 @@ TEST(Reader, HousingAndWindingSwappedAreRecognised) {
   double core = 25, housing = 25;
   for (int i = 0; i < 600; ++i) {
     const double current = (i / 37) % 2 == 0 ? 3 : 0;
-TEST(Reader, TenthsOfADegreeAreNoKelvin) {
-  says(complaint(head + "0,1,239\n1,1,331\n"),
-       "looks like tenths of a degree; say --column housing_degC=housing_degC:0.1degC");
-  says(complaint(head + "0,1,281\n1,1,731\n"), "looks like tenths of a degree");
-  says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,192,188\n1,1,331,189\n"), "ambient_degC:0.1degC");
-}
     for (std::string* text : {&right, &swapped}) {
       *text += std::to_string(i) + "," + std::to_string(current) + "," + std::to_string(housing) + "," +
                std::to_string(core) + "\n";
