@@ -51,6 +51,21 @@ void note_unused(Log& log) {
     log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
 }
 
+/// What is 0 in all rows beside another column that tells the heat, as loggers write what nothing measured.
+void forget_idle_heat(Log& log) {
+  constexpr Role heats[] = {Role::power,   Role::current, Role::iq,    Role::phase_a,
+                            Role::phase_b, Role::phase_c, Role::torque};
+  const auto flows = [&](Role role) { return largest_magnitude(log.of(role)) > 0; };
+  const auto other = std::find_if(std::begin(heats), std::end(heats), flows);
+  if (other == std::end(heats)) return;
+  for (const Role role : {Role::power, Role::current, Role::iq}) {
+    if (!log.has(role) || flows(role)) continue;
+    log.of(role).clear();
+    log.notes.push_back(
+        fmt::format("{} is 0 in all rows, beside {}, and was left out.", own_name(role), own_name(*other)));
+  }
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
@@ -95,6 +110,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
+  forget_idle_heat(log);
   read_phases(log);
   if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
     refuse_data(name +

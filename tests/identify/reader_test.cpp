@@ -344,6 +344,15 @@ TEST(Reader, ASensorThatReadsNothingButMinusOneIsLeftOut) {
   EXPECT_TRUE(read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,\n2,2,21,9\n")[0].has(Role::ambient));
 }
 
+TEST(Reader, AMeterThatReadsNothingButZeroDoesNotHideAnother) {
+  const auto power = read("time_s,current_A,power_W,housing_degC\n0,1,0,20\n1,2,0,21\n")[0];
+  EXPECT_FALSE(power.has(Role::power));
+  EXPECT_EQ(identify::heat_of(power), Role::current);
+  says(fmt::format("{}", fmt::join(power.notes, " ")), "power_W is 0 in all rows, beside current_A, and was left out");
+  EXPECT_EQ(identify::heat_of(read("time_s,current_A,iq_A,housing_degC\n0,0,1,20\n1,0,2,21\n")[0]), Role::iq);
+  EXPECT_TRUE(read(head + "0,0,20\n1,0,21\n")[0].has(Role::current));
+}
+
 TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 0.2);
