@@ -296,11 +296,13 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
           "{}: column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs, or its unit "
           "alone if they are the shaft's.",
           table.file, source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
-    else if (unit.empty() && role == Role::speed && source.column != own_name(role))
+    else if (unit.empty() && role == Role::speed && source.column != own_name(role)) {
+      source.unit_guessed = true;
       notes.push_back(
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
                       "in revolutions a minute, :rev/s if in turns a second.",
                       source.column, own_name(role), for_a_shell(source.column + ":rpm")));
+    }
     if (unit.empty() && std::count(std::begin(temperatures), std::end(temperatures), role) > 0)
       ask_for_the_unit(table, source.column, role);
     if (!unit.empty())

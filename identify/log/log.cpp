@@ -88,6 +88,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
     log.called[static_cast<std::size_t>(role)] = source.column;
+    if (role == Role::speed) log.speed_guessed = source.unit_guessed;
     const auto& from = table.columns[index_of(table, source)];
     auto& to = log.of(role);
     to.reserve(rows.size());

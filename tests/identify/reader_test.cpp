@@ -1531,18 +1531,24 @@ TEST(Pauses, ARoomThatWasTypedOnceIsThatOfEveryPart) {
   EXPECT_EQ(logs[1].of(Role::ambient).front(), 19);
 }
 TEST(Pauses, WhatIsSoOfALogIsSoOfItsParts) {
-  std::string text = "time_s,torque_Nm,housing_degC\n";
+  std::string text = "t,torque_Nm,housing_degC,velocity\n";
   for (int i = 0; i < 1200; ++i) {
-    if (i < 200 || i >= 1000) text += fmt::format("{},2,{}\n", i, 20 + 0.03 * i);
+    if (i < 200 || i >= 1000) text += fmt::format("{},2,{},{}\n", i, 20 + 0.03 * i, i % 9);
   }
   ColumnMap map;
   map.ambient_degC = 19;
+  add_column(map, "speed_rad_per_s=velocity");
   const auto logs = read(text, map);
   ASSERT_EQ(logs.size(), 2u);
   for (const Log& log : logs) {
     EXPECT_TRUE(log.torque_for_A) << "took newton metres for amperes";
     EXPECT_TRUE(log.sink_typed);
+    EXPECT_TRUE(log.speed_guessed);
+    EXPECT_EQ(identify::column_in(log, Role::time, "ms"), "--column time_s=t:ms");
   }
+  ColumnMap said;
+  add_column(said, "speed_rad_per_s=velocity:rev/s");
+  EXPECT_FALSE(read(text, said)[0].speed_guessed);
 }
 TEST(Pauses, ACurrentThatIsNotWrittenForAWhileIsOneAlsoAtTheEnd) {
   const auto logs = read(recording(400, [](int i, double& current_A, double&) {
