@@ -75,14 +75,17 @@ bool has_any(const std::string& name, std::initializer_list<const char*> words) 
   return std::any_of(words.begin(), words.end(), [&](const char* word) { return has_word(name, word); });
 }
 
-/// What a column's name shows not to be what such a role asks: of what a motor drives, of what feeds it or switches its
-/// current, or another quantity (StatorCurrent is no stator's temperature).
+/// What a column's name shows not to be what such a role asks: of what a motor drives, of what feeds it, or another
+/// quantity (current_temperature is no current, and StatorCurrent no stator's temperature).
 bool is_none(const std::string& name, Role role) {
-  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s"});
+  const bool temperature = has_any(name, {"temp", "degc", "\u00b0c"});
+  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan"});
   if (role == Role::current)
-    return has_any(name, {"supply", "battery", "batt", "bus", "ibus", "input", "current_in", "charge"});
-  const bool temperature = std::find(std::begin(temperatures), std::end(temperatures), role) != std::end(temperatures);
-  return temperature && has_any(name, {"current", "volt", "speed", "veloc", "torque", "resist", "ohm", "flux"});
+    return temperature ||
+           has_any(name, {"supply", "batt", "bus", "ibus", "input", "current_in", "charge", "hour", "state", "mode",
+                          "pos", "angle", "speed", "vel", "rpm", "time", "volt", "torque"});
+  return std::find(std::begin(temperatures), std::end(temperatures), role) != std::end(temperatures) && !temperature &&
+         has_any(name, {"current", "volt", "speed", "veloc", "torque", "resist", "ohm", "flux"});
 }
 
 /// Of what switches the motor's current, as VESC (temp_mos_max) and PX4 (esc_temperature) have it beside the motor's.
@@ -197,8 +200,8 @@ void refuse_one_value_a_row(const Table& table) {
     return at == table.names.end() ? std::string() : *at;
   };
   const std::string value = any({"_value", "value", "state"});
-  const std::string of =
-      any({"_field", "field", "entity_id", "metric", "signal", "signal_name", "channel", "variable"});
+  const std::string of = any({"_field", "field", "entity_id", "entry", "key", "metric", "name", "signal", "signal_name",
+                              "channel", "topic", "variable"});
   if (!value.empty() && !of.empty())
     refuse_data(
         fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "

@@ -795,6 +795,7 @@ TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
 TEST(Reader, OneValueARowIsRefusedWithWhatToDo) {
   says(complaint("time,_field,_value\n0,current,1\n0,temp,20\n1,current,1\n"),
        "each row has one value ('_value') and what it is of ('_field'); pivot the table");
+  says(complaint("Timestamp,Name,Value\n0,/motor/current,1\n0,/motor/temp,20\n"), "what it is of ('Name')");
 }
 
 TEST(Reader, AColumnCalledTimeIsTheTime) {
@@ -899,6 +900,15 @@ TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
   says(talon, "--column current_A=StatorCurrent");
   says(talon, "--column housing_degC=DeviceTemp");
   says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
+}
+
+TEST(Reader, AWordOfSeveralMeaningsIsReadBesideOthers) {
+  const std::string servo = complaint(
+      "time_s,current_state,current_speed,amp_hours,current_temperature,load_current\n"
+      "0,1,1,0,20,1\n1,8,2,1,21,2\n");
+  says(servo, "--column current_A=load_current");
+  says(servo, "--column housing_degC=current_temperature");
+  says(servo, "--column speed_rad_per_s=current_speed");
 }
 
 TEST(Reader, AGuessIsOfOneMotor) {
