@@ -100,30 +100,41 @@ bool is_commanded(const std::string& name) {
       name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max", "error"});
 }
 
-/// Do numbers in its name tell another motor than those in another's? esc[1].temperature beside esc[0].current does.
-bool of_another(const std::string& name, const std::string& other) {
-  const auto numbers = [](std::string text) {
-    const std::string in_brackets = bracketed(text);
-    if (const std::string of = quantity_of(in_brackets); !of.empty() && of != "number")  // [0.1 degC]
-      text.resize(text.size() - in_brackets.size() - 2);
-    std::vector<std::string> out;
-    bool within = false;
-    for (const char c : text) {
-      const bool digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
-      if (digit && !within) out.emplace_back();
-      if (digit) out.back() += c;
-      within = digit;
-    }
-    return out;
+/// esc[0].motor_temp: esc, 0, motor, temp.
+std::vector<std::string> words_of(const std::string& name) {
+  const auto kind = [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return std::isdigit(byte) != 0 ? 1 : std::isalpha(byte) != 0 ? 2 : 0;
   };
-  const std::vector<std::string> a = numbers(name), b = numbers(other);
-  const auto both = static_cast<std::ptrdiff_t>(std::min(a.size(), b.size()));
-  return !std::equal(a.begin(), a.begin() + both, b.begin());
+  std::vector<std::string> words;
+  int before = 0;
+  for (const char c : in_small(name)) {
+    if (kind(c) != 0 && kind(c) != before) words.emplace_back();
+    if (kind(c) != 0) words.back() += c;
+    before = kind(c);
+  }
+  return words;
+}
+
+/// Is a column of another motor than the column `of`? So it is where one that is called alike shares the word with
+/// `of` that it does not: right.temp beside left.current, where there is a left.temp.
+bool of_another(const std::vector<std::vector<std::string>>& names, const std::vector<std::string>& name,
+                const std::vector<std::string>& of) {
+  const auto said = [&](const std::string& word) { return std::find(of.begin(), of.end(), word) != of.end(); };
+  return std::any_of(names.begin(), names.end(), [&](const std::vector<std::string>& other) {
+    if (other.size() != name.size() || other == of) return false;
+    const auto [mine, its] = std::mismatch(name.begin(), name.end(), other.begin());
+    return mine != name.end() && std::equal(mine + 1, name.end(), its + 1) && said(*its) && !said(*mine) &&
+           *its != "motor";  // temp_case is of the same as temp_motor
+  });
 }
 
 /// Of the same motor rather than of another, which moves rather than which stands, and measured rather than commanded:
 /// of the first words that such a column has.
 std::optional<Guess> likely_column(const Table& table, const Taken& taken, const std::vector<Likely>& likely) {
+  std::vector<std::vector<std::string>> names;
+  for (const std::string& name : table.names) names.push_back(words_of(name));
+  const std::vector<std::string> motor = words_of(taken.of_motor);
   std::optional<Guess> best;
   int best_doubts = 0;
   for (const auto& [role, words] : likely) {
@@ -132,7 +143,7 @@ std::optional<Guess> likely_column(const Table& table, const Taken& taken, const
       const std::vector<std::string>& other = taken.columns;
       if (std::find(other.begin(), other.end(), name) != other.end() || is_none(name, role)) continue;
       if (std::none_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); })) continue;
-      const int doubts = 4 * of_another(name, taken.of_motor) + 2 * stands(table.columns[c]) + is_commanded(name);
+      const int doubts = 4 * of_another(names, names[c], motor) + 2 * stands(table.columns[c]) + is_commanded(name);
       if (best && doubts >= best_doubts) continue;
       const std::string unit = named_rms(name)                                         ? rms_unit(role)
                                : role == Role::time && has_any(name, {"ms", "millis"}) ? ":ms"

@@ -924,6 +924,9 @@ TEST(Reader, AGuessIsOfOneMotor) {
   for (const char* column :
        {"torque_Nm=motor_1_tau_est", "housing_degC=motor_1_temperature_0", "speed_rad_per_s=motor_1_dq"})
     says(joints, std::string("--column ") + column);
+  says(complaint("time,left.current,left.temp,right.current,right.temp\n0,1,0,1,20\n1,2,0,2,21\n"),
+       "--column housing_degC=left.temp");
+  says(complaint("time_s,current_motor,temp_motor,temp_case\n0,1,0,20\n1,2,0,21\n"), "--column housing_degC=temp_case");
   // A column that is read now and then moves all the same.
   says(complaint("time_s,current_A,temp_1,temp_2\n0,1,20,20\n1,2,20,\n2,2,20,21\n3,2,20,\n"),
        "--column housing_degC=temp_2");
