@@ -60,8 +60,7 @@ std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
               : fmt::format(", and '{}' is no unit for a column '{}' (units: {})", source.column.substr(colon + 1),
                             source.column.substr(0, colon), fmt::join(unit_names(), ", "));
       refuse(fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file, source.column,
-                         own_name(role), wire::pc::did_you_mean(source.column, table.names), no_unit,
-                         fmt::join(table.names, ", ")));
+                         own_name(role), wire::pc::did_you_mean(source.column, table.names), no_unit, table.has()));
     }
     found[role] = source;
   }

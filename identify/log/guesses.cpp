@@ -295,8 +295,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
     useful.push_back(guess.option() + (guess.role == Role::speed ? speed_words(guess.column) : ""));
   if (!useful.empty()) hints.push_back(fmt::format("of use as well: {}", fmt::join(useful, ", ")));
   refuse_data(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
-                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "),
-                          fmt::join(table.names, ", ")));
+                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), table.has()));
 }
 
 }  // namespace identify

@@ -56,7 +56,7 @@ void keep_rows(Table& table, const std::string& choice) {
   const int found = table.find(column);
   if (found < 0)
     refuse(fmt::format("{}: {} has no column '{}'{} (it has: {}).", where, table.file, column,
-                       wire::pc::did_you_mean(column, table.names), fmt::join(table.names, ", ")));
+                       wire::pc::did_you_mean(column, table.names), table.has()));
   const auto c = static_cast<std::size_t>(found);
   std::vector<std::size_t> rows;
   std::vector<std::string> others;

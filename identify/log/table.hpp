@@ -55,6 +55,7 @@ struct Table {
 
   std::size_t rows() const { return line.size(); }
   int find(const std::string& name) const;  // -1: no such column
+  std::string has() const;                  // the columns' names in a row, the first hundred of more
 };
 
 /// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when it is no readable file.

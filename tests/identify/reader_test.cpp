@@ -902,6 +902,14 @@ TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
   says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
 }
 
+TEST(Reader, OfThousandsOfColumnsTheFirstHundredAreNamed) {
+  std::string text = "time_s,current_A";
+  for (int i = 0; i < 3000; ++i) text += fmt::format(",x{}", i);
+  text += "\n0,1";
+  for (int i = 0; i < 3000; ++i) text += ",0";
+  says(complaint(text + "\n"), "x96, x97 and 2902 more.");
+}
+
 TEST(Reader, AWordOfSeveralMeaningsIsReadBesideOthers) {
   const std::string servo = complaint(
       "time_s,current_state,current_speed,amp_hours,current_temperature,load_current\n"
