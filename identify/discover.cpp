@@ -176,10 +176,17 @@ std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log
 }
 
 /// Why no board gets a set; empty when one does.
-std::string why_no_model(const Problem& problem, const std::string& poor) {
+std::string why_no_model(const Problem& problem, const std::vector<Log>& logs, const Fit& offered,
+                         const std::string& poor) {
   if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
   if (problem.heated_by_power()) return "the log tells a power and a board measures a current; record current_A";
   if (!problem.in_amperes()) return "the log tells a torque and a board measures a current; give --motor FILE";
+  const auto guessed = std::find_if(logs.begin(), logs.end(), [](const Log& log) { return log.speed_guessed; });
+  const bool by_speed = std::any_of(offered.chosen.begin(), offered.chosen.end(),
+                                    [](const Chosen& c) { return cause_of(c).needs == Needs::speed; });
+  if (guessed != logs.end() && by_speed)
+    return fmt::format("it goes by speed, whose unit nobody told; say {}, or :rpm or :rev/s",
+                       column_in(*guessed, Role::speed, "rad/s"));
   return "";
 }
 
@@ -251,7 +258,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     if (!report.held_out->against.empty()) report.sentence += " " + report.held_out->against;
   }
   shorten_names(report.plots);
-  report.no_model = why_no_model(problem, poor);
+  report.no_model = why_no_model(problem, logs, offer.fit, poor);
   if (!report.no_model.empty()) return report;
   report.model_toml = heat_set_toml(problem, offer.fit, report.sentence, offer.trust);
   report.baseline_toml = heat_set_toml(problem, baseline, "The two-resistor model as fitted, without what was found.",

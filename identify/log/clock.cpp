@@ -14,10 +14,19 @@ namespace {
 
 using wire::pc::refuse_data;
 
+constexpr double day_s = 86400;
+
 }  // namespace
 
 void check_epoch(const Log& log, double first_cell) {
-  if (log.of(Role::time).front() < 1e11) return;
+  const auto& t = log.of(Role::time);
+  // No recording lasts for three years; one of microseconds since its clock began does in two minutes.
+  constexpr double most_s = 1e8;
+  if (const double lasts_s = t.back() - t.front(); t.front() < 1e11 && lasts_s > most_s)
+    refuse_data(fmt::format(
+        "{}: it would last {:.0f} days, as no recording does; say in what its time counts, {}, or :ms or :ns.",
+        log.name, lasts_s / day_s, column_in(log, Role::time, "us")));
+  if (t.front() < 1e11) return;
   const std::string unit = first_cell > 1e17 ? "ns" : first_cell > 1e14 ? "us" : first_cell > 1e11 ? "ms" : "s";
   refuse_data(fmt::format("{}: the first time is {:.0f}, which looks like {} since 1970; say {}.", log.name, first_cell,
                           unit, column_in(log, Role::time, unit)));
@@ -102,8 +111,13 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
   return repeated;
 }
 
+bool counts_from_midnight(const std::string& name) {
+  const std::string low = in_small(name);
+  return low.find("today") != low.npos || low.find("of_day") != low.npos || low.find("midnight") != low.npos;
+}
+
 void pass_midnights(Log& log) {
-  constexpr double day_s = 86400, near_s = 600;
+  constexpr double near_s = 600;
   double before_s = 0;
   int midnights = 0;
   for (double& t : log.of(Role::time)) {

@@ -20,8 +20,11 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
 /// A column of the time since the first row of a session, of rows that are a period apart.
 Source give_clock(Table& table, const std::vector<Session>& sessions, double period_s);
 
-/// Refuses a clock that counts from 1970 and in no seconds. 1e11 s is in the year 5138.
+/// Refuses a clock that counts in no seconds: from 1970 (1e11 s is in the year 5138), or for longer than any recording.
 void check_epoch(const Log& log, double first_cell);
+
+/// Is a column of numbers a time of day by its name, as ms_today is?
+bool counts_from_midnight(const std::string& name);
 
 /// A time of day that falls by half a day or more has passed midnight; one that rises by nearly a day is a row from
 /// before it, out of order.

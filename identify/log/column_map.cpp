@@ -60,8 +60,7 @@ std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
               : fmt::format(", and '{}' is no unit for a column '{}' (units: {})", source.column.substr(colon + 1),
                             source.column.substr(0, colon), fmt::join(unit_names(), ", "));
       refuse(fmt::format("{}: column '{}' for {} is missing{}{} (the file has: {}).", table.file, source.column,
-                         own_name(role), wire::pc::did_you_mean(source.column, table.names), no_unit,
-                         fmt::join(table.names, ", ")));
+                         own_name(role), wire::pc::did_you_mean(source.column, table.names), no_unit, table.has()));
     }
     found[role] = source;
   }
@@ -292,14 +291,17 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
           "is not the one in {} (units: {}).",
           told, source.column, own_name(role), source.column, own_name(role), fmt::join(unit_names(), ", ")));
     else if (role == Role::speed && named_electrical(source.column))
-      notes.push_back(
-          fmt::format("Column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs.",
-                      source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
-    else if (unit.empty() && role == Role::speed && source.column != own_name(role))
+      refuse_data(fmt::format(
+          "{}: column '{}' counts turns of the field; say --column {}={} of a motor of seven pole pairs, or its unit "
+          "alone if they are the shaft's.",
+          table.file, source.column, own_name(role), for_a_shell(source.column + ":0.1429rpm")));
+    else if (unit.empty() && role == Role::speed && source.column != own_name(role)) {
+      source.unit_guessed = true;
       notes.push_back(
           fmt::format("No unit of column '{}' is known; it is read in rad/s. Say --column {}={} if it is "
-                      "in revolutions a minute.",
+                      "in revolutions a minute, :rev/s if in turns a second.",
                       source.column, own_name(role), for_a_shell(source.column + ":rpm")));
+    }
     if (unit.empty() && std::count(std::begin(temperatures), std::end(temperatures), role) > 0)
       ask_for_the_unit(table, source.column, role);
     if (!unit.empty())

@@ -59,6 +59,7 @@ struct Source {
   double factor = 1, offset = 0;  // SI = factor * (cell + offset)
   bool unit_said = false;         // else a row of units in the table may say it, or the column's name
   std::string said = "";          // column and unit as they were written
+  bool unit_guessed = false;      // nobody told it, and it is one of several that are usual
 };
 
 /// Which column plays which role, and how its unit becomes ours.

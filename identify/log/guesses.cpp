@@ -9,6 +9,7 @@
 #include <cmath>
 #include <optional>
 
+#include "identify/log/impossible.hpp"
 #include "identify/log/units.hpp"
 #include "wire/pc/names.hpp"
 #include "wire/pc/user_error.hpp"
@@ -36,7 +37,7 @@ const char* rms_unit(Role role) {
   return role == Role::current ? ":1.2247A" : role == Role::iq || role == Role::id ? ":1.4142A" : "";
 }
 
-bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "electric"); }
+bool named_electrical(const std::string& name) { return has_word(name, "erpm") || has_word(name, "elec"); }
 
 namespace {
 
@@ -54,45 +55,111 @@ struct Guess {
   std::string option() const { return "--column " + own_name(role) + "=" + for_a_shell(column + unit); }
 };
 
-std::vector<std::string> columns_of(const std::map<Role, Source>& found) {
-  std::vector<std::string> out;
-  for (const auto& [unused, source] : found) out.push_back(source.column);
+/// Columns that have a role, and one that tells whose motor's they are.
+struct Taken {
+  std::vector<std::string> columns;
+  std::string of_motor = "";
+};
+
+Taken taken_of(const std::map<Role, Source>& found) {
+  Taken out;
+  for (const auto& [unused, source] : found) out.columns.push_back(source.column);
+  for (const Role role :
+       {Role::current, Role::iq, Role::phase_a, Role::torque, Role::power, Role::housing, Role::core}) {
+    if (out.of_motor.empty() && found.contains(role)) out.of_motor = found.at(role).column;
+  }
   return out;
 }
 
-/// Metres a second, or the like: of what the motor drives.
-bool of_a_vehicle(const std::string& name) {
-  return has_word(name, "mps") || has_word(name, "kmh") || has_word(name, "km/h") || has_word(name, "meters") ||
-         has_word(name, "m/s");
+bool has_any(const std::string& name, std::initializer_list<const char*> words) {
+  return std::any_of(words.begin(), words.end(), [&](const char* word) { return has_word(name, word); });
 }
 
-/// Of the first words that a column has which moves and is not `taken`.
-std::optional<Guess> likely_column(const Table& table, const std::vector<std::string>& taken,
-                                   const std::vector<Likely>& likely) {
-  for (const bool moves : {true, false}) {
-    for (const auto& [role, words] : likely) {
-      for (std::size_t c = 0; c < table.names.size(); ++c) {
-        const std::string& name = table.names[c];
-        if (std::find(taken.begin(), taken.end(), name) != taken.end()) continue;
-        if (role == Role::speed && of_a_vehicle(name)) continue;
-        const std::vector<double>& cells = table.columns[c];
-        const bool has = std::any_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); });
-        const bool stands = count_told(cells) > 0 && largest_magnitude(spacing(cells)) == 0;
-        if (!has || stands == moves) continue;
-        const std::string unit = named_rms(name)                              ? rms_unit(role)
-                                 : role == Role::time && has_word(name, "ms") ? ":ms"
-                                                                              : "";
-        return Guess{role, name, unit};
-      }
+/// What a column's name shows not to be what such a role asks: of what a motor drives, of what feeds it, or another
+/// quantity (current_temperature is no current, and StatorCurrent no stator's temperature).
+bool is_none(const std::string& name, Role role) {
+  const bool temperature = has_any(name, {"temp", "degc", "\u00b0c"});
+  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan"});
+  if (role == Role::current)
+    return temperature ||
+           has_any(name, {"supply", "batt", "bus", "ibus", "input", "current_in", "charge", "hour", "state", "mode",
+                          "pos", "angle", "speed", "vel", "rpm", "time", "volt", "torque"});
+  return std::find(std::begin(temperatures), std::end(temperatures), role) != std::end(temperatures) && !temperature &&
+         has_any(name, {"current", "volt", "speed", "veloc", "torque", "resist", "ohm", "flux"});
+}
+
+/// Of what switches the motor's current, as VESC (temp_mos_max) and PX4 (esc_temperature) have it beside the motor's.
+bool of_a_controller(const std::string& name) {
+  return has_any(name, {"mos", "fet", "esc", "controller", "driver", "inverter", "igbt", "bridge", "stage", "board",
+                        "pcb", "mcu", "cpu", "batt"});
+}
+
+/// What was asked for, beside what is: Iq_setpoint and Iq_measured.
+bool is_commanded(const std::string& name) {
+  return has_any(
+      name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max", "error"});
+}
+
+/// esc[0].motor_temp: esc, 0, motor, temp.
+std::vector<std::string> words_of(const std::string& name) {
+  const auto kind = [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return std::isdigit(byte) != 0 ? 1 : std::isalpha(byte) != 0 ? 2 : 0;
+  };
+  std::vector<std::string> words;
+  int before = 0;
+  for (const char c : in_small(name)) {
+    if (kind(c) != 0 && kind(c) != before) words.emplace_back();
+    if (kind(c) != 0) words.back() += c;
+    before = kind(c);
+  }
+  return words;
+}
+
+/// Is a column of another motor than the column `of`? So it is where one that is called alike shares the word with
+/// `of` that it does not: right.temp beside left.current, where there is a left.temp.
+bool of_another(const std::vector<std::vector<std::string>>& names, const std::vector<std::string>& name,
+                const std::vector<std::string>& of) {
+  const auto said = [&](const std::string& word) { return std::find(of.begin(), of.end(), word) != of.end(); };
+  return std::any_of(names.begin(), names.end(), [&](const std::vector<std::string>& other) {
+    if (other.size() != name.size() || other == of) return false;
+    const auto [mine, its] = std::mismatch(name.begin(), name.end(), other.begin());
+    return mine != name.end() && std::equal(mine + 1, name.end(), its + 1) && said(*its) && !said(*mine) &&
+           *its != "motor";  // temp_case is of the same as temp_motor
+  });
+}
+
+/// Of the same motor rather than of another, which moves rather than which stands, and measured rather than commanded:
+/// of the first words that such a column has.
+std::optional<Guess> likely_column(const Table& table, const Taken& taken, const std::vector<Likely>& likely) {
+  std::vector<std::vector<std::string>> names;
+  for (const std::string& name : table.names) names.push_back(words_of(name));
+  const std::vector<std::string> motor = words_of(taken.of_motor);
+  std::optional<Guess> best;
+  int best_doubts = 0;
+  for (const auto& [role, words] : likely) {
+    for (std::size_t c = 0; c < table.names.size(); ++c) {
+      const std::string& name = table.names[c];
+      const std::vector<std::string>& other = taken.columns;
+      if (std::find(other.begin(), other.end(), name) != other.end() || is_none(name, role)) continue;
+      if (std::none_of(words.begin(), words.end(), [&](const char* w) { return has_word(name, w); })) continue;
+      const int doubts = 4 * of_another(names, names[c], motor) + 2 * stands(table.columns[c]) + is_commanded(name);
+      if (best && doubts >= best_doubts) continue;
+      const std::string unit = named_rms(name)                                         ? rms_unit(role)
+                               : role == Role::time && has_any(name, {"ms", "millis"}) ? ":ms"
+                               : role == Role::time && has_word(name, "micros")        ? ":us"
+                                                                                       : "";
+      best = Guess{role, name, unit};
+      best_doubts = doubts;
     }
   }
-  return std::nullopt;
+  return best;
 }
 
 /// What has to be said with a speed's column whose name tells no unit of the shaft's.
 std::string speed_words(const std::string& name) {
   if (named_electrical(name)) return " (electrical: with its unit, as :0.1429rpm of seven pole pairs)";
-  return unit_in_name(name, own_name(Role::speed)).empty() ? " (and its unit, as :rpm)" : "";
+  return unit_in_name(name, own_name(Role::speed)).empty() ? " (and its unit, as :rpm or :rev/s)" : "";
 }
 
 /// The current in d beside that in q: its name with a d for a q.
@@ -115,7 +182,7 @@ const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung
 /// Columns that nothing needs, and that would tell more; `what` each is.
 std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
   const std::pair<std::vector<Likely>, const char*> useful[] = {
-      {{{Role::speed, {"velocity", "speed", "rpm", "erpm", "omega", "drehzahl"}}}, "the motor's speed"},
+      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "dq"}}}, "the motor's speed"},
       {windings, "the winding's temperature"},
       {housings, "the housing's temperature"},
       {rooms, "the room's temperature"},
@@ -124,7 +191,7 @@ std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, st
   std::vector<std::pair<Guess, const char*>> out;
   for (const auto& [likely, what] : useful) {
     const auto guess =
-        found.contains(likely.front().role) ? std::nullopt : likely_column(table, columns_of(found), likely);
+        found.contains(likely.front().role) ? std::nullopt : likely_column(table, taken_of(found), likely);
     if (!guess) continue;
     found[guess->role] = {guess->column};
     out.emplace_back(*guess, what);
@@ -144,8 +211,8 @@ void refuse_one_value_a_row(const Table& table) {
     return at == table.names.end() ? std::string() : *at;
   };
   const std::string value = any({"_value", "value", "state"});
-  const std::string of =
-      any({"_field", "field", "entity_id", "metric", "signal", "signal_name", "channel", "variable"});
+  const std::string of = any({"_field", "field", "entity_id", "entry", "key", "metric", "name", "signal", "signal_name",
+                              "channel", "topic", "variable"});
   if (!value.empty() && !of.empty())
     refuse_data(
         fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
@@ -153,16 +220,22 @@ void refuse_one_value_a_row(const Table& table) {
                     table.file, value, of));
 }
 
-/// A temperature of the motor, where no column has such a role: the housing's rather than the winding's.
+/// A temperature of the motor, where no column has such a role: the housing's rather than the winding's, and one that
+/// stands, as of a sensor that is not connected, rather than what may be the controller's.
 std::optional<Guess> likely_temperature(const Table& table, const std::map<Role, Source>& found) {
-  std::vector<std::string> taken = columns_of(found);
+  const Likely motors = {Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp", "mottemp", "mot_temp"}};
+  Taken taken = taken_of(found);
   const auto winding = likely_column(table, taken, windings);
   for (const auto& other : {windings, rooms, coolants}) {
-    while (const auto of_it = likely_column(table, taken, other)) taken.push_back(of_it->column);
+    while (const auto of_it = likely_column(table, taken, other)) taken.columns.push_back(of_it->column);
+  }
+  const auto motor = likely_column(table, taken, {motors});
+  for (const std::string& name : table.names) {
+    if (of_a_controller(name) && (!motor || motor->column != name)) taken.columns.push_back(name);
   }
   std::vector<Likely> likely = housings;
-  likely.insert(likely.begin(), {Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp"}});
-  if (!winding) likely.push_back({Role::housing, {"temp", "degc", "\u00b0c", "t_"}});
+  likely.insert(likely.begin(), motors);
+  if (!winding && !motor) likely.push_back({Role::housing, {"temp", "degc", "\u00b0c", "t_"}});
   const auto housing = likely_column(table, taken, likely);
   return housing ? housing : winding;
 }
@@ -189,26 +262,32 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   };
   if (!by_row && none_of({Role::time}))
     ask_for("a time column",
-            likely_column(table, columns_of(taken),
-                          {{Role::time, {"time", "zeit", "stamp", "ms"}}, {Role::time, {"date", "datum"}}}),
+            likely_column(
+                table, taken_of(taken),
+                {{Role::time, {"time", "zeit", "stamp", "ms", "millis", "micros"}}, {Role::time, {"date", "datum"}}}),
             "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
   if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
-    const auto guess = likely_column(table, columns_of(taken),
+    const auto guess = likely_column(table, taken_of(taken),
                                      {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
                                       {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
                                       {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
                                       {Role::current, {"current", "curr", "strom", "amp"}},
                                       {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
-                                      {Role::torque, {"torque", "effort", "drehmoment"}},
+                                      {Role::torque, {"torque", "tau", "effort", "drehmoment"}},
                                       {Role::power, {"loss", "p_loss", "verlust"}},
                                       {Role::power, {"power", "watt", "leistung"}}});
     ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
     if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";
     if (guess && guess->role == Role::power) hints.back() += " if that is what heats the winding";
   }
-  if (none_of({Role::housing, Role::core}))
-    ask_for("a measured temperature (housing_degC or core_degC)", likely_temperature(table, taken), "map it with {}",
-            Role::housing);
+  if (none_of({Role::housing, Role::core})) {
+    const auto guess = likely_temperature(table, taken);
+    ask_for("a measured temperature (housing_degC or core_degC)", guess, "map it with {}", Role::housing);
+    const auto at = guess ? static_cast<std::size_t>(table.find(guess->column)) : 0;
+    if (guess && table.rows() > 1 && stands(table.columns[at]))
+      hints.back() +=
+          fmt::format(", which says {:g} in all rows: see whether its sensor is connected", lowest(table.columns[at]));
+  }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);
   std::vector<std::string> useful;
@@ -216,8 +295,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
     useful.push_back(guess.option() + (guess.role == Role::speed ? speed_words(guess.column) : ""));
   if (!useful.empty()) hints.push_back(fmt::format("of use as well: {}", fmt::join(useful, ", ")));
   refuse_data(fmt::format("{}: {} {} missing; {}. The file has: {}.", table.file, fmt::join(missing_ones, " and "),
-                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "),
-                          fmt::join(table.names, ", ")));
+                          missing_ones.size() == 1 ? "is" : "are", fmt::join(hints, "; "), table.has()));
 }
 
 }  // namespace identify

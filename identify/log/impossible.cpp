@@ -30,7 +30,7 @@ void check_normalised(const Log& log) {
     for (const Role role : roles) largest = std::max(largest, largest_magnitude(log.of(role)));
     return largest > 0 && largest <= most;
   };
-  const auto moves = [&](Role role) { return largest_magnitude(spacing(log.of(role))) > 0; };
+  const auto moves = [&](Role role) { return count_told(log.of(role)) > 0 && !stands(log.of(role)); };
   if (told_small(temperatures) && told_small(load_roles) &&
       std::any_of(std::begin(temperatures), std::end(temperatures), moves))
     refuse_data(
@@ -109,11 +109,15 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
           fmt::format("{}: {} never falls below {:.0f}, which looks like parts of a degree; say {} (or "
                       "what one is worth).",
                       log.name, own_name(role), low, column_in(log, role, "0.01degC")));
-    if (low > 200)
-      refuse_data(fmt::format("{}: {} never falls below {:.0f}, which looks like kelvin; say {}.", log.name,
-                              own_name(role), low, column_in(log, role, "K")));
-    // A room is 10..45 degC, which reads 50..113 in Fahrenheit. Coolant and motors may truly be that warm, a room may
-    // not.
+    // A motor that is measured begins above -23 degC and stays below 200; a room is 10..45 degC, which reads 50..113 in
+    // Fahrenheit.
+    const bool kelvin = low > 250 && largest_magnitude(log.of(role)) < 473;
+    if (low > 200 || (role == Role::ambient && low > 113))
+      refuse_data(fmt::format(
+          "{}: {} never falls below {:.0f}, which looks like {}.", log.name, own_name(role), low,
+          kelvin ? fmt::format("kelvin; say {} (or :0.1degC of tenths of a degree)", column_in(log, role, "K"))
+                 : fmt::format("tenths of a degree; say {}", column_in(log, role, "0.1degC"))));
+    // Coolant and motors may truly be that warm, a room may not.
     if (role == Role::ambient && low > 55)
       refuse_data(
           fmt::format("{}: ambient_degC never falls below {:.0f}, which looks like Fahrenheit; say {} (and the same "
@@ -129,13 +133,23 @@ void check_values(const Log& log, const std::optional<wire::Motor>& motor) {
         fmt::format("{0}: {1} never falls below {2:.0f} and there is no ambient_degC: say how warm the room was, "
                     "--ambient DEGC, or record it; if this is Fahrenheit say {3}.",
                     log.name, own_name(motor_at), lowest(log.of(motor_at)), column_in(log, motor_at, "degF")));
+  // Beside a meter's offset and noise.
+  constexpr double clearly = 0.05, often = 0.01;
+  const std::vector<double>& power = log.of(Role::power);
+  const double below_W = -clearly * largest_magnitude(power);
+  const auto negative = std::count_if(power.begin(), power.end(), [&](double W) { return W < below_W; });
+  if (static_cast<double>(negative) > often * static_cast<double>(count_told(power)))
+    refuse_data(fmt::format(
+        "{}: power_W is negative in {} rows, as what heats a winding never is: this is what the shaft or the supply "
+        "gives and takes; map the current instead, or the loss alone.",
+        log.name, negative));
   const double most_A = most_current_A(motor);
   for (const Role role : {Role::current, Role::id, Role::iq}) {
     const double peak = largest_magnitude(log.of(role));
     if (peak > most_A)
       refuse_data(
           fmt::format("{0}: {1} reaches {2:.0f} A, where more than {3:.0f} A cannot be; if it is in mA say "
-                      "{4}, if it is another quantity map the right column.",
+                      "{4} (or what one is worth), if it is another quantity map the right column.",
                       log.name, own_name(role), peak, most_A, column_in(log, role, "mA")));
   }
   if (log.has(Role::speed)) check_range(log, Role::speed, -2e4, 2e4, "rad/s");

@@ -51,6 +51,21 @@ void note_unused(Log& log) {
     log.notes.push_back(fmt::format("{} {} not used.", fmt::join(unused, ", "), unused.size() == 1 ? "is" : "are"));
 }
 
+/// What is 0 in all rows beside another column that tells the heat, as loggers write what nothing measured.
+void forget_idle_heat(Log& log) {
+  constexpr Role heats[] = {Role::power,   Role::current, Role::iq,    Role::phase_a,
+                            Role::phase_b, Role::phase_c, Role::torque};
+  const auto flows = [&](Role role) { return largest_magnitude(log.of(role)) > 0; };
+  const auto other = std::find_if(std::begin(heats), std::end(heats), flows);
+  if (other == std::end(heats)) return;
+  for (const Role role : {Role::power, Role::current, Role::iq}) {
+    if (!log.has(role) || flows(role)) continue;
+    log.of(role).clear();
+    log.notes.push_back(
+        fmt::format("{} is 0 in all rows, beside {}, and was left out.", own_name(role), own_name(*other)));
+  }
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
@@ -73,6 +88,7 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
   for (const auto& [role, source] : found) {
     if (role == Role::session) continue;
     log.called[static_cast<std::size_t>(role)] = source.column;
+    if (role == Role::speed) log.speed_guessed = source.unit_guessed;
     const auto& from = table.columns[index_of(table, source)];
     auto& to = log.of(role);
     to.reserve(rows.size());
@@ -82,26 +98,27 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
       log.notes.push_back(fmt::format("Column '{}' shows negative numbers without their sign, {:.0f} for -1; read so.",
                                       source.column, std::exp2(bits) - 1));
     for (double& x : to) x = source.factor * (x + source.offset);
-    // A sensor that is not connected; 0 degC all along, and not by a hundredth otherwise, is no weather.
+    // A sensor that is not connected; 0 degC or -1 all along, and not by a hundredth otherwise, is no weather.
     const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
-                           count_told(to) > 1 && largest_magnitude(to) == 0;
+                           count_told(to) > 1 && stands(to) && (lowest(to) == 0 || lowest(to) == -1);
     if (unplugged) {
+      log.notes.push_back(fmt::format("{} is {:g} in all rows, as of a sensor that is not connected, and was left out.",
+                                      own_name(role), lowest(to)));
       to.clear();
-      log.notes.push_back(
-          fmt::format("{} is 0 in all rows, as of a sensor that is not connected, and was left out.", own_name(role)));
     } else if (count_told(to) == 0) {
       to.clear();
       log.notes.push_back(
           fmt::format("Column '{}' ({}) has no value at all and was left out.", source.column, own_name(role)));
     }
   }
+  forget_idle_heat(log);
   read_phases(log);
   if (!log.has(Role::current) && !log.has(Role::iq) && !log.has(Role::power) && !log.has(Role::torque))
     refuse_data(name +
                 ": the heat input (current_A, iq_A, power_W or torque_Nm) has no value at all; record the log again.");
   check_alone(log, found);
   check_epoch(log, time[rows.front()]);
-  if (table.of_day[time_column]) pass_midnights(log);
+  if (table.of_day[time_column] || counts_from_midnight(table.names[time_column])) pass_midnights(log);
   check_time(table, log, rows);
   spread_shared_times(log);
   const double start_s = log.of(Role::time).front();
@@ -194,9 +211,11 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   const auto first_of = [&](std::initializer_list<Role> roles) {
     return index_of(table, found.at(*std::find_if(roles.begin(), roles.end(), has)));
   };
-  const std::string several = several_motors(
-      table, first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
-      first_of({Role::housing, Role::core}), known);
+  const bool one_clock = has(Role::time) && !has(Role::session);
+  const std::string several =
+      several_motors(table, one_clock ? table.columns[first_of({Role::time})] : std::vector<double>(),
+                     first_of({Role::current, Role::iq, Role::phase_a, Role::phase_b, Role::power, Role::torque}),
+                     first_of({Role::housing, Role::core}), known);
   if (!several.empty()) refuse_data(several);
   const int session = has(Role::session) ? table.find(found.at(Role::session).column) : -1;
   const std::vector<Session> sessions = sessions_of(table, session);

@@ -46,6 +46,7 @@ struct Log {
   double core_step_K = 0;         // of one as coarse, however it is read
   Reference core_reference = {};  // of readings of the winding
   bool torque_for_A = false;      // a torque stands in iq_A as it is, for want of the motor's constant
+  bool speed_guessed = false;     // in which unit it is, to be rad/s
   bool loaded_before = false;     // a row's load flowed since the row before, not until the next one
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }

@@ -157,9 +157,11 @@ std::vector<Log> parts_between_pauses(Log log) {
   std::size_t from = 0;
   for (const std::size_t to : ends) {
     Log part = part_of(log, from, to);
+    part.called = log.called;
     part.sink_degC = first_degC(log);
     part.sink_typed = log.sink_typed;
     part.torque_for_A = log.torque_for_A;
+    part.speed_guessed = log.speed_guessed;
     part.core_reference = log.core_reference;
     const std::size_t readings = std::max(count_told(part.of(Role::housing)), count_told(part.of(Role::core)));
     if (to - from >= least_rows && readings >= least_readings)

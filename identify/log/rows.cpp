@@ -56,7 +56,7 @@ void keep_rows(Table& table, const std::string& choice) {
   const int found = table.find(column);
   if (found < 0)
     refuse(fmt::format("{}: {} has no column '{}'{} (it has: {}).", where, table.file, column,
-                       wire::pc::did_you_mean(column, table.names), fmt::join(table.names, ", ")));
+                       wire::pc::did_you_mean(column, table.names), table.has()));
   const auto c = static_cast<std::size_t>(found);
   std::vector<std::size_t> rows;
   std::vector<std::string> others;
@@ -99,23 +99,28 @@ std::vector<Session> sessions_of(const Table& table, int column) {
   return out;
 }
 
-std::string several_motors(const Table& table, std::size_t heat, std::size_t temperature,
-                           const std::vector<std::size_t>& known) {
-  constexpr std::size_t most = 16;            // motors of one robot's leg, arm or hand
+std::string several_motors(const Table& table, const std::vector<double>& time, std::size_t heat,
+                           std::size_t temperature, const std::vector<std::size_t>& known) {
   constexpr double in_turn = 0.7, apart = 3;  // of the rows (of a sign by chance a half); times each motor's own steps
   for (std::size_t c = 0; c < table.names.size(); ++c) {
     if (std::find(known.begin(), known.end(), c) != known.end()) continue;
+    const bool named = named_after_motors(table.names[c]);
+    const std::size_t most = named ? 64 : 16;  // motors of a robot with its hands; of a leg, an arm or a hand
     std::vector<std::string> key, values;
-    std::size_t changes = 0;
+    std::size_t changes = 0, begins = 0;
     for (std::size_t r = 0; r < table.rows() && values.size() <= most; ++r) {
       key.push_back(said(table, c, r));
       if (std::find(values.begin(), values.end(), key.back()) == values.end()) values.push_back(key.back());
-      changes += r > 0 && key[r] != key[r - 1];
+      const bool changed = r > 0 && key[r] != key[r - 1];
+      changes += changed;
+      begins += changed && !time.empty() && time[r] < time[r - 1];
     }
+    // All of one, then all of the next.
+    const bool in_blocks = named && changes + 1 == values.size() && begins == changes;
     constexpr std::size_t least_rows = 5;  // of each: what hardly comes again is a reading and no name
     if (values.size() < 2 || values.size() > most || table.rows() < least_rows * values.size() ||
         std::find(values.begin(), values.end(), "") != values.end() ||
-        static_cast<double>(changes) < in_turn * static_cast<double>(table.rows()))
+        (!in_blocks && static_cast<double>(changes) < in_turn * static_cast<double>(table.rows())))
       continue;
     // A column of message kinds changes in turn as well, and each kind fills cells of its own.
     const bool each_is_whole = std::all_of(values.begin(), values.end(), [&](const std::string& value) {
@@ -129,11 +134,12 @@ std::string several_motors(const Table& table, std::size_t heat, std::size_t tem
     });
     if (!each_is_whole) continue;
     const auto [next_K, same_K] = moves_K(table.columns[temperature], key);
-    if (!named_after_motors(table.names[c]) && !(next_K > apart * same_K)) continue;
+    if (!named && !(next_K > apart * same_K)) continue;
     std::sort(values.begin(), values.end());
     return fmt::format(
-        "{}: its rows belong to several motors in turn, as column '{}' tells ({}); choose one with --rows \"{}={}\".",
-        table.file, table.names[c], fmt::join(values, ", "), table.names[c], values.front());
+        "{}: its rows belong to several motors {}, as column '{}' tells ({}); choose one with --rows \"{}={}\".",
+        table.file, in_blocks ? "one after the other" : "in turn", table.names[c], fmt::join(values, ", "),
+        table.names[c], values.front());
   }
   return "";
 }

@@ -23,9 +23,10 @@ void keep_rows(Table& table, const std::string& choice);
 /// it says nothing belong to none.
 std::vector<Session> sessions_of(const Table& table, int column);
 
-/// What tells apart motors that share a table, each with rows of its own in turn: a sentence; empty where nothing does.
-/// `heat`, `temperature`: columns that each of them fills. `known`: columns that have another meaning.
-std::string several_motors(const Table& table, std::size_t heat, std::size_t temperature,
-                           const std::vector<std::size_t>& known);
+/// What tells apart motors that share a table, each with rows of its own in turn or from its own first time on: a
+/// sentence; empty where nothing does. `time`: empty where a person tells the rows apart, or there is none. `heat`,
+/// `temperature`: columns that each of them fills. `known`: columns that have another meaning.
+std::string several_motors(const Table& table, const std::vector<double>& time, std::size_t heat,
+                           std::size_t temperature, const std::vector<std::size_t>& known);
 
 }  // namespace identify

@@ -2,6 +2,7 @@
 #include "identify/log/table.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -328,6 +329,12 @@ double largest_magnitude(const std::vector<double>& cells) {
   return most;
 }
 
+bool stands(const std::vector<double>& cells) {
+  double low = missing, high = missing;  // fmin and fmax pass over what is missing
+  for (const double x : cells) low = std::fmin(low, x), high = std::fmax(high, x);
+  return low == high;
+}
+
 std::vector<double> spacing(const std::vector<double>& cells) {
   std::vector<double> out;
   for (std::size_t i = 1; i < cells.size(); ++i) out.push_back(cells[i] - cells[i - 1]);
@@ -373,6 +380,13 @@ std::string Words::in_row(std::size_t row) const {
 int Table::find(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   return at == names.end() ? -1 : static_cast<int>(at - names.begin());
+}
+
+std::string Table::has() const {
+  constexpr std::size_t most = 100;
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), most));
+  return fmt::format("{}{}", fmt::join(names.begin(), end, ", "),
+                     names.size() > most ? fmt::format(" and {} more", names.size() - most) : "");
 }
 
 Table read_table(const std::string& path) {

@@ -21,6 +21,9 @@ namespace identify {
 std::size_t count_told(const std::vector<double>& cells);
 double largest_magnitude(const std::vector<double>& cells);
 
+/// Does each cell that is not missing say the same? Not of none.
+bool stands(const std::vector<double>& cells);
+
 /// From each cell to the next, one fewer.
 std::vector<double> spacing(const std::vector<double>& cells);
 
@@ -52,6 +55,7 @@ struct Table {
 
   std::size_t rows() const { return line.size(); }
   int find(const std::string& name) const;  // -1: no such column
+  std::string has() const;                  // the columns' names in a row, the first hundred of more
 };
 
 /// Throws wire::pc::UserError (unusable) with file, line, column and what to do; (usage) when it is no readable file.

@@ -67,7 +67,9 @@ const std::map<std::string, std::string>& spellings() {
       {"nsec", "ns"},        {"minutes", "min"},   {"hours", "h"},   {"days", "d"},          {"kelvin", "K"},
       {"degc", "degC"},      {"celsius", "degC"},  {"degf", "degF"}, {"fahrenheit", "degF"}, {"nm", "Nm"},
       {"n·m", "Nm"},         {"n*m", "Nm"},        {"n.m", "Nm"},    {"ohms", "ohm"},        {"°c", "degC"},
-      {"ºc", "degC"},        {"°f", "degF"},       {"ºf", "degF"},                    // º: the sign of an ordinal
+      {"ºc", "degC"},        {"°f", "degF"},       {"ºf", "degF"},  // º: the sign of an ordinal
+      {"rad_s", "rad/s"},    {"deg_s", "deg/s"},   {"dps", "deg/s"}, {"deg_c", "degC"},      {"deg_f", "degF"},
+      {"turn/s", "rev/s"},   {"turns/s", "rev/s"}, {"hz", "Hz"},                      // as programs write
       {"℃", "degC"},         {"℉", "degF"},        {"µs", "us"},     {"μs", "us"},    // the sign micro, the letter mu
       {"Ω", "ohm"},          {"mΩ", "mohm"},       {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter, the sign ohm
   };
@@ -93,7 +95,8 @@ std::optional<Unit> multiple_of_unit(const std::string& text) {
 }  // namespace
 
 std::optional<Unit> unit_named(const std::string& unit) {
-  auto at = units().find(unit);
+  // Names in small letters alone, as programs like them, have milliamperes so; MA is another unit.
+  auto at = units().find(unit == "ma" ? "mA" : unit == "mv" ? "mV" : unit);
   if (at == units().end()) {
     std::string plain;
     for (const char c : unit) {

@@ -209,6 +209,16 @@ TEST(SlowBadInput, TheSheetOfAnotherMotor) {
   refused(spoilt(as_it_is, insulated), "30 times off the sheet");
 }
 
+TEST(SlowBadInput, ACurrentThatIsReadTooSmall) {
+  // Registers of Dynamixel's X series count 2.69 mA (control table of the XM430, e-Manual), and may be read as mA.
+  const auto in_mA = [](auto& row, int i) {
+    if (i > 0) row[1] = fmt::format("{:.5f}", std::stod(row[1]) / 2.69), row[5] = "";
+    return true;
+  };
+  says(run(spoilt(in_mA) + " --motor ec-16-40w").out,
+       "a current that is read 2.7 times too small; see the current's unit");
+}
+
 TEST(BadInput, APauseInWhichTheMotorRanOn) {
   const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
   const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");

@@ -74,6 +74,20 @@ TEST(Map, EachThatComesAlongIsReadAndTheOneOfSessionsTellsThePeriod) {
   }
 }
 
+TEST(Map, OfVescToolReadsItsLog) {
+  // A part of its columns; each line ends in a separator, and a day within the log.
+  ColumnMap map = identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/vesc.toml");
+  add_column(map, "speed_rad_per_s=erpm:0.1429rpm");
+  const Log log = read(
+      "ms_today;input_voltage;temp_mos_max;temp_motor;current_motor;current_in;d_axis_current;q_axis_current;erpm;\n"
+      "86399900;24.0;25.0;24.5;-2.5;0.3;0.01;-2.5;-700;\n0;24.0;26.0;24.6;3.0;0.4;0.01;3.0;7000;\n",
+      map)[0];
+  EXPECT_NEAR(log.of(Role::time)[1], 0.1, 1e-9);
+  EXPECT_EQ(log.of(Role::iq), (std::vector<double>{-2.5, 3}));
+  EXPECT_EQ(log.of(Role::housing)[1], 24.6);
+  EXPECT_NEAR(log.of(Role::speed)[1], 1000.3 * M_PI / 30, 1e-9);
+}
+
 TEST(Reader, RowsWithoutATimeFollowEachOtherByThePeriodThatIsSaidInEachSession) {
   ColumnMap map;
   map.period_s = 0.5;
@@ -187,6 +201,10 @@ TEST(Reader, AnOwnNameInAnotherUnitIsKnownByItsName) {
   EXPECT_NEAR(log.of(Role::housing)[1], 100, 1e-9);
   EXPECT_NEAR(log.of(Role::speed)[0], 6.283185307, 1e-9);
   says(log.notes.front(), "current_A in mA");
+  const Log small = read("time_s,current_ma,housing_deg_f,speed_rad_s\n0,1000,50,60\n1,2000,212,60\n")[0];
+  EXPECT_DOUBLE_EQ(small.of(Role::current)[1], 2);
+  EXPECT_NEAR(small.of(Role::housing)[1], 100, 1e-9);
+  EXPECT_EQ(small.of(Role::speed)[0], 60);
   EXPECT_DOUBLE_EQ(read("time_s,current_A,current_mA,housing_degC\n0,1,7,20\n1,2,7,21\n")[0].of(Role::current)[1], 2);
   says(complaint("time_s,current_mA,current_kA,housing_degC\n0,1,7,20\n"),
        "columns 'current_mA' and 'current_kA' may both be current_A");
@@ -317,6 +335,22 @@ TEST(Reader, ASensorThatReadsNothingButZeroIsLeftOut) {
   const Log log = read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,0\n2,2,22,0\n")[0];
   EXPECT_FALSE(log.has(Role::ambient));
   says(log.notes[0], "ambient_degC is 0 in all rows, as of a sensor that is not connected, and was left out.");
+}
+
+TEST(Reader, ASensorThatReadsNothingButMinusOneIsLeftOut) {
+  const auto logs = read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,-1\n1,2,21,-1\n");
+  EXPECT_FALSE(logs[0].has(Role::ambient));
+  says(fmt::format("{}", fmt::join(logs[0].notes, " ")), "ambient_degC is -1 in all rows, as of a sensor that is not");
+  EXPECT_TRUE(read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,\n2,2,21,9\n")[0].has(Role::ambient));
+}
+
+TEST(Reader, AMeterThatReadsNothingButZeroDoesNotHideAnother) {
+  const auto power = read("time_s,current_A,power_W,housing_degC\n0,1,0,20\n1,2,0,21\n")[0];
+  EXPECT_FALSE(power.has(Role::power));
+  EXPECT_EQ(identify::heat_of(power), Role::current);
+  says(fmt::format("{}", fmt::join(power.notes, " ")), "power_W is 0 in all rows, beside current_A, and was left out");
+  EXPECT_EQ(identify::heat_of(read("time_s,current_A,iq_A,housing_degC\n0,0,1,20\n1,0,2,21\n")[0]), Role::iq);
+  EXPECT_TRUE(read(head + "0,0,20\n1,0,21\n")[0].has(Role::current));
 }
 
 TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
@@ -475,6 +509,24 @@ TEST(Reader, AClockThatPassesMidnightGoesOn) {
   says(complaint(head + "86399,1,20\n1,1,20\n"), "time runs backwards");
 }
 
+TEST(Reader, MillisecondsOfADayPassMidnight) {
+  // As VESC's ms_today.
+  ColumnMap map;
+  add_column(map, "time_s=ms_today:ms");
+  const auto logs = read("ms_today,current_A,housing_degC\n86399000,1,20\n86399500,1,20\n0,1,21\n500,1,21\n", map);
+  EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 0.5, 1, 1.5}));
+  says(fmt::format("{}", fmt::join(logs[0].notes, " ")), "passes midnight 1 time");
+  says(complaint(head + "86399,1,20\n86399.5,1,20\n0,1,21\n0.5,1,21\n"), "two recordings joined");
+  says(complaint("ms_today,current_A,housing_degC\n5000000,1,20\n6000000,1,20\n0,1,21\n500,1,21\n", map),
+       "two recordings joined");
+}
+
+TEST(Reader, AClockThatWouldRunForYearsIsAskedForItsUnit) {
+  // As PX4's timestamp, in microseconds since it was switched on.
+  says(complaint("timestamp,current_A,housing_degC\n12345678,1,20\n1212345678,1,21\n"),
+       "it would last 13889 days, as no recording does; say in what its time counts, --column time_s=timestamp:us");
+}
+
 TEST(Reader, ARowWrittenTwiceCountsOnce) {
   const Log log = read(head + "0,1,20\n1,1,20\n1,1,20\n1,1,20\n1,1,21\n2,1,21\n")[0];
   EXPECT_EQ(log.of(Role::time).size(), 4u);
@@ -598,6 +650,20 @@ TEST(Rows, OfSeveralMotorsAreRefusedAndThoseOfOneAreRead) {
   ColumnMap sessions;
   add_column(sessions, "session=motor");
   says(complaint(text, sessions), "its rows belong to several motors in turn");
+}
+
+TEST(Rows, OfMotorsOneAfterTheOtherOrOfAWholeRobotAreRefusedAsWell) {
+  std::string blocks = "time_s,joint,current_A,housing_degC\n", robot = blocks;
+  for (const char* joint : {"hip", "knee"}) {
+    for (int i = 0; i < 10; ++i) blocks += fmt::format("{},{},{},{}\n", i, joint, i % 3, 20 + i);
+  }
+  says(complaint(blocks),
+       "several motors one after the other, as column 'joint' tells (hip, knee); choose one with --rows \"joint=hip\"");
+  ColumnMap map;
+  add_column(map, "session=joint");
+  EXPECT_EQ(read(blocks, map).size(), 2u);
+  for (int i = 0; i < 29 * 6; ++i) robot += fmt::format("{},{},{},{}\n", i / 29, i % 29, i % 3, 20 + i % 29);
+  says(complaint(robot), "several motors in turn, as column 'joint' tells (0, 1, 10");
 }
 
 TEST(Rows, ACounterOfMessagesOrABitThatTogglesIsNoMotor) {
@@ -729,6 +795,7 @@ TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
 TEST(Reader, OneValueARowIsRefusedWithWhatToDo) {
   says(complaint("time,_field,_value\n0,current,1\n0,temp,20\n1,current,1\n"),
        "each row has one value ('_value') and what it is of ('_field'); pivot the table");
+  says(complaint("Timestamp,Name,Value\n0,/motor/current,1\n0,/motor/temp,20\n"), "what it is of ('Name')");
 }
 
 TEST(Reader, AColumnCalledTimeIsTheTime) {
@@ -788,11 +855,20 @@ TEST(Reader, ATemperatureWithoutAUnitBesideOthersInFahrenheitIsAskedFor) {
 TEST(Reader, AnAmplitudeWithoutTheOtherIsToldWithItsColumn) {
   ColumnMap map;
   add_column(map, "iq_A=motor_iq");
-  add_column(map, "speed_rad_per_s=erpm");
-  const auto notes = read("time_s,motor_id,motor_iq,erpm,housing_degC\n0,1,1,0,20\n1,2,2,7,21\n", map)[0].notes;
-  const std::string said = fmt::format("{}", fmt::join(notes, " "));
-  says(said, "say --column id_A=motor_id");
-  says(said, "say --column speed_rad_per_s=erpm:0.1429rpm of a motor of seven pole pairs");
+  const auto notes = read("time_s,motor_id,motor_iq,housing_degC\n0,1,1,20\n1,2,2,21\n", map)[0].notes;
+  says(fmt::format("{}", fmt::join(notes, " ")), "say --column id_A=motor_id");
+}
+
+TEST(Reader, TurnsOfTheFieldAreNoTurnsOfTheShaft) {
+  for (const std::string name : {"erpm", "eRPM", "elec_freq_Hz", "electrical_speed"}) {
+    const std::string rows = "time_s,current_A," + name + ",housing_degC\n0,1,0,20\n1,2,7,21\n";
+    ColumnMap map;
+    add_column(map, "speed_rad_per_s=" + name);
+    says(complaint(rows, map), "counts turns of the field; say --column speed_rad_per_s=" + name + ":0.1429rpm");
+    ColumnMap said;
+    add_column(said, "speed_rad_per_s=" + name + ":0.5rpm");
+    EXPECT_NEAR(read(rows, said)[0].of(Role::speed)[1], 3.5 * M_PI / 30, 1e-9);
+  }
 }
 
 TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
@@ -812,10 +888,62 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
        "--column power_W=\"Power (W)\" if that is what heats the winding");
 }
 
+TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
+  // As VESC, ArduPilot, ODrive and Talon call theirs; the motor's sensor is not connected in the first two.
+  const std::string vesc = complaint("ms_today,temp_mos_max,temp_motor,current_motor\n0,20,-1,1\n1,30,-1,2\n");
+  says(vesc, "--column housing_degC=temp_motor, which says -1 in all rows: see whether its sensor is connected");
+  says(complaint("TimeUS,Curr,Temp,MotTemp\n0,1,20,0\n1,2,30,0\n"), "--column housing_degC=MotTemp");
+  says(complaint("time_s,current_A,fet_thermistor.temperature,motor_thermistor.temperature\n0,1,20,20\n1,2,30,21\n"),
+       "--column housing_degC=motor_thermistor.temperature");
+  says(complaint("time_s,current_A,esc_temperature\n0,1,20\n1,2,30\n"), "--column housing_degC=NAME");
+  const std::string talon = complaint("time_s,SupplyCurrent,StatorCurrent,DeviceTemp\n0,1,1,20\n1,2,3,21\n");
+  says(talon, "--column current_A=StatorCurrent");
+  says(talon, "--column housing_degC=DeviceTemp");
+  says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
+}
+
+TEST(Reader, OfThousandsOfColumnsTheFirstHundredAreNamed) {
+  std::string text = "time_s,current_A";
+  for (int i = 0; i < 3000; ++i) text += fmt::format(",x{}", i);
+  text += "\n0,1";
+  for (int i = 0; i < 3000; ++i) text += ",0";
+  says(complaint(text + "\n"), "x96, x97 and 2902 more.");
+}
+
+TEST(Reader, AWordOfSeveralMeaningsIsReadBesideOthers) {
+  const std::string servo = complaint(
+      "time_s,current_state,current_speed,amp_hours,current_temperature,load_current\n"
+      "0,1,1,0,20,1\n1,8,2,1,21,2\n");
+  says(servo, "--column current_A=load_current");
+  says(servo, "--column housing_degC=current_temperature");
+  says(servo, "--column speed_rad_per_s=current_speed");
+}
+
+TEST(Reader, AGuessIsOfOneMotor) {
+  // As PX4 and Unitree number theirs.
+  const std::string esc = complaint(
+      "timestamp,esc[0].esc_current,esc[0].motor_temperature,esc[1].esc_current,esc[1].motor_temperature,esc[1].esc_"
+      "rpm\n"
+      "0,1,0,2,20,9\n1,2,0,3,21,10\n");
+  says(esc, "--column current_A=\"esc[0].esc_current\"");
+  says(esc, "--column housing_degC=\"esc[0].motor_temperature\"");
+  const std::string joints = complaint(
+      "time_s,motor_0_temperature_0,motor_1_dq,motor_1_tau_est,motor_1_temperature_0\n0,20,1,1,20\n1,21,2,2,21\n");
+  for (const char* column :
+       {"torque_Nm=motor_1_tau_est", "housing_degC=motor_1_temperature_0", "speed_rad_per_s=motor_1_dq"})
+    says(joints, std::string("--column ") + column);
+  says(complaint("time,left.current,left.temp,right.current,right.temp\n0,1,0,1,20\n1,2,0,2,21\n"),
+       "--column housing_degC=left.temp");
+  says(complaint("time_s,current_motor,temp_motor,temp_case\n0,1,0,20\n1,2,0,21\n"), "--column housing_degC=temp_case");
+  // A column that is read now and then moves all the same.
+  says(complaint("time_s,current_A,temp_1,temp_2\n0,1,20,20\n1,2,20,\n2,2,20,21\n3,2,20,\n"),
+       "--column housing_degC=temp_2");
+}
+
 TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string rows = "time_s,current_A,housing_degC,velocity,T_winding,motor\n0,1,20,0,20,1\n1,2,21,9,30,1\n";
   const std::string notes = fmt::format("{}", fmt::join(read(rows)[0].notes, " "));
-  says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm)");
+  says(notes, "say --column speed_rad_per_s=velocity (and its unit, as :rpm or :rev/s)");
   says(notes, "say --column core_degC=T_winding.");
   const std::string core_only = "time_s,current_A,core_degC,T_case,n_rpm\n0,1,20,20,0\n1,2,21,21,9\n";
   const std::string told = fmt::format("{}", fmt::join(read(core_only)[0].notes, " "));
@@ -824,6 +952,16 @@ TEST(Reader, WhatIsOfUseAndNotUsedIsSaid) {
   const std::string of_a_car =
       fmt::format("{}", fmt::join(read("time_s,current_A,housing_degC,speed_mps\n0,1,20,0\n1,2,21,9\n")[0].notes, " "));
   EXPECT_EQ(of_a_car.find("speed_mps"), std::string::npos) << "metres a second are no motor's";
+}
+
+TEST(Reader, APowerThatIsNegativeIsNoHeat) {
+  std::string text = "time_s,power_W,housing_degC\n", meter = text;
+  for (int i = 0; i < 50; ++i) {
+    text += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -8 : 20, 20 + i);
+    meter += fmt::format("{},{},{}\n", i, i % 5 == 4 ? -0.2 : 20, 20 + i);
+  }
+  says(complaint(text), "power_W is negative in 10 rows, as what heats a winding never is");
+  EXPECT_TRUE(read(meter)[0].has(Role::power));
 }
 
 TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
@@ -975,6 +1113,12 @@ TEST(Reader, AHeaderInAUnitOfOneLetterIsRefusedWithTheConversion) {
   says(complaint("time_h,current_A,housing_degC\n0,1,20\n"), "--column time_s=time_h:h");
 }
 TEST(Reader, KelvinIsRecognised) { says(complaint(head + "0,1,293\n1,1,294\n"), "looks like kelvin"); }
+TEST(Reader, TenthsOfADegreeAreNoKelvin) {
+  says(complaint(head + "0,1,239\n1,1,331\n"),
+       "looks like tenths of a degree; say --column housing_degC=housing_degC:0.1degC");
+  says(complaint(head + "0,1,281\n1,1,731\n"), "looks like tenths of a degree");
+  says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,192,188\n1,1,331,189\n"), "ambient_degC:0.1degC");
+}
 TEST(Reader, FahrenheitIsRecognisedAtTheAmbient) {
   says(complaint("time_s,current_A,housing_degC,ambient_degC\n0,1,70,70\n1,1,71,70\n"), "looks like Fahrenheit");
 }
@@ -1141,6 +1285,10 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   for (const char* rpm : {"RPM", "Rpm", "rpm", "1/min", "min-1"})
     EXPECT_NEAR(factor("speed_rad_per_s", rpm), 0.104719755, 1e-9);
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
+  for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
+  for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
+  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
+  EXPECT_EQ(factor("current_A", "ma"), 1e-3);
   EXPECT_EQ(factor("time_s", "ns"), 1e-9);
   for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
   for (const char* mohm : {"mohm", "mΩ", "mΩ"}) EXPECT_EQ(factor("winding_ohm", mohm), 1e-3);
@@ -1404,18 +1552,24 @@ TEST(Pauses, ARoomThatWasTypedOnceIsThatOfEveryPart) {
   EXPECT_EQ(logs[1].of(Role::ambient).front(), 19);
 }
 TEST(Pauses, WhatIsSoOfALogIsSoOfItsParts) {
-  std::string text = "time_s,torque_Nm,housing_degC\n";
+  std::string text = "t,torque_Nm,housing_degC,velocity\n";
   for (int i = 0; i < 1200; ++i) {
-    if (i < 200 || i >= 1000) text += fmt::format("{},2,{}\n", i, 20 + 0.03 * i);
+    if (i < 200 || i >= 1000) text += fmt::format("{},2,{},{}\n", i, 20 + 0.03 * i, i % 9);
   }
   ColumnMap map;
   map.ambient_degC = 19;
+  add_column(map, "speed_rad_per_s=velocity");
   const auto logs = read(text, map);
   ASSERT_EQ(logs.size(), 2u);
   for (const Log& log : logs) {
     EXPECT_TRUE(log.torque_for_A) << "took newton metres for amperes";
     EXPECT_TRUE(log.sink_typed);
+    EXPECT_TRUE(log.speed_guessed);
+    EXPECT_EQ(identify::column_in(log, Role::time, "ms"), "--column time_s=t:ms");
   }
+  ColumnMap said;
+  add_column(said, "speed_rad_per_s=velocity:rev/s");
+  EXPECT_FALSE(read(text, said)[0].speed_guessed);
 }
 TEST(Pauses, ACurrentThatIsNotWrittenForAWhileIsOneAlsoAtTheEnd) {
   const auto logs = read(recording(400, [](int i, double& current_A, double&) {

@@ -785,6 +785,17 @@ TEST(SlowModelFile, ABoardGetsTheMostCautiousOfWhatIsNearlyAsGoodAsTheName) {
   says(all, "bears a push the shortest");
 }
 
+TEST(SlowModelFile, NoBoardGetsAModelThatGoesByASpeedWhoseUnitNobodyTold) {
+  Hidden log = hidden({.duty = tests::Duty::designed, .seed = 770252, .effects = {"speed_loss_quadratic"}});
+  log.logs[0].speed_guessed = true;
+  const auto report = identify::discover(log.logs, log.log.sheet);
+  says(report.no_model, "it goes by speed, whose unit nobody told; say --column speed_rad_per_s=");
+  EXPECT_TRUE(report.model_toml.empty());
+  Hidden without = hidden({.seed = 5003});
+  without.logs[0].speed_guessed = true;
+  EXPECT_EQ(identify::discover(without.logs, without.log.sheet).no_model, "");
+}
+
 TEST(SlowSearch, WithoutASheetANameAsksForALargerLead) {
   const Hidden log = hidden({.duty = tests::Duty::designed, .seed = 770112, .effects = {"constant_heat"}});
   identify::Problem problem = identify::problem_of(log.logs, {});
