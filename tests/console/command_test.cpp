@@ -107,6 +107,13 @@ TEST_F(Commands, BackupThenRestoreBringsEachBitBack) {
   EXPECT_EQ(board_->in_force, before);
 }
 
+TEST_F(Commands, WhatStandsInCommonIsOfBothAxes) {
+  std::ofstream(path("p.toml")) << "[common]\ncurrent_limit_A = 5\n";
+  const auto changed = json("restore " + path("p.toml"))["changed"];
+  EXPECT_EQ(changed["axis0.current_limit_A"]["after"], 5.0);
+  EXPECT_EQ(changed["axis1.current_limit_A"]["after"], 5.0);
+}
+
 TEST_F(Commands, DiffAgainstDefaults) {
   EXPECT_EQ(json("diff")["differences"].size(), 2u);  // the resistance that has no default, on both axes
   EXPECT_EQ(say("set axis0.current_limit_A=3").code, 0);
@@ -474,6 +481,8 @@ TEST_F(Commands, FilesThatAreWrongAreNamed) {
   refused("restore " + path("p.toml"), 2, "is no number");
   write("[axis0\n");
   refused("restore " + path("p.toml"), 2, "p.toml");
+  write("[axis1]\ncurrent_limit_A = 5\n[common]\ncurrent_limit_A = 7\n");
+  refused("restore " + path("p.toml"), 2, "p.toml: axis1.current_limit_A is given twice; give it one value.");
   write("");
   refused("restore " + path("p.toml"), 2, "no parameter in it");
 }
