@@ -218,7 +218,7 @@ void capture(Console& console, const CaptureArguments& a) {
       values.clear();
       next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values);
       for (std::size_t at = 0; at < values.size(); at += row.size()) {
-        const int periods = (file.rows() - status.pre) * status.decimation;
+        const auto periods = static_cast<double>((file.rows() - status.pre) * status.decimation);
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(at), row.size(), row.begin());
         file.add(periods / double{session.hello().pwm_Hz}, row);
         for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);

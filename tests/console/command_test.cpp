@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every command as a person types it, against a board made of a script.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <csignal>
 #include <filesystem>
@@ -359,6 +360,62 @@ TEST_F(Commands, AFileThatIsThereStaysUnlessForceIsSaid) {
   old("i/log.csv");
   refused("identify --out " + path("i"), 2, "i/log.csv: there is such a file already");
   EXPECT_EQ(content(path("i/log.csv")), "old");
+}
+
+/// Left by a hotcore that was killed, or in the hands of one that runs.
+TEST_F(Commands, RowsThatWaitForTheirNameAreNotWrittenOver) {
+  std::ofstream(path("x.csv.part")) << "old";
+  refused("log --seconds 0.1 --out " + path("x.csv"), 2, "x.csv.part: another hotcore writes it now, or was killed");
+  EXPECT_EQ(content(path("x.csv.part")), "old");
+  EXPECT_EQ(say("log --force --seconds 0.1 --out " + path("x.csv")).code, 0);
+}
+
+TEST_F(Commands, AFullDiskEndsALogAtOnceAndLeavesWholeRows) {
+  rlimit usual{};
+  getrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit full = usual;
+  full.rlim_cur = 10'000;
+  setrlimit(RLIMIT_FSIZE, &full);
+  const Said said = say("log --out " + path("x.csv") + " --seconds 1000");
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(said.code, 2);
+  EXPECT_LT(board_->now_s, 100);
+  const std::string text = content(path("x.csv"));
+  EXPECT_GT(text.size(), 9'000u);
+  EXPECT_EQ(text.back(), '\n');
+  const auto rows = std::count(text.begin(), text.end(), '\n') - std::count(text.begin(), text.end(), '#') - 1;
+  EXPECT_NE(said.err.find("the disk is full; make room and log again; " + path("x.csv") + " holds the " +
+                          std::to_string(rows) + " rows until then.\n"),
+            std::string::npos)
+      << said.err << rows;
+}
+
+TEST_F(Commands, ADeviceIsWrittenToAndNotPutAway) {
+  for (const char* device : {"/dev/full", "/dev/null"}) {
+    const std::string link = path(std::string(device).substr(5));
+    std::filesystem::create_symlink(device, link);
+    for (const std::string line : {"log --seconds 0.1 --out ", "capture axis0.iq_A --out ", "backup "}) {
+      const Said said = say(line + link);
+      EXPECT_EQ(said.code, device == std::string("/dev/full") ? 2 : 0) << line << said.err;
+      EXPECT_TRUE(std::filesystem::is_symlink(link)) << line;
+    }
+  }
+}
+
+TEST_F(Commands, WhateverEndsALogItsRowsAreTold) {
+  const std::string place = path("x.csv");
+  console::LogFile file(place, "", {"iq_A"});
+  const wire::pc::UserError stopped(wire::pc::Exit::interrupted, "Stopped and disarmed.");
+  EXPECT_THROW(file.end(stopped), wire::pc::UserError);
+  file.add(0.0, {1.0f});
+  try {
+    file.end(stopped);
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_EQ(error.what(), "Stopped and disarmed; " + place + " holds the 1 rows until then.");
+    EXPECT_EQ(error.exit_code(), 130);
+  }
 }
 
 TEST_F(Commands, AFolderThatIsMissingIsToldAndNotMade) {
