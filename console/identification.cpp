@@ -45,7 +45,10 @@ void run_identify(std::vector<std::string> arguments, const std::string& json, b
   int status = 0;
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  const int code = child > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 127;
+  stop_if_interrupted("Stopped while identify worked; nothing was written, the log is kept.");
+  if (child > 0 && WIFSIGNALED(status))
+    refuse_data(fmt::format("identify was killed by signal {}; the log is kept, run it by hand.", WTERMSIG(status)));
+  const int code = child > 0 ? WEXITSTATUS(status) : 127;
   if (code == 127) refuse_data("The program identify was not found; build it or put it beside hotcore.");
   if (code != 0 && !std::filesystem::exists(json))
     refuse_data("identify could not use the log; its sentence stands above, the log is kept.");
@@ -81,14 +84,15 @@ Driven record(Console& console, int axis, const std::vector<Piece>& course, cons
   try {
     {
       Armed armed(session, mask);
-      driven = drive(session, mask, course, Along::d, [&](const wire::State& state, double time_s) {
+      const auto look = [&](const wire::State& state, double time_s) {
         if (time_s - told_s < length_s / 10) return;
         told_s = time_s;
         console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed",
                                  100 * time_s / length_s, state.axis[axis].core_degC,
                                  std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
                                  state.axis[axis].allowance_A));
-      });
+      };
+      driven = drive(session, mask, course, Along::d, look)[static_cast<std::size_t>(axis)];
     }
     recorder.finish();
   } catch (const UserError& error) {

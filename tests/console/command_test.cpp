@@ -136,6 +136,18 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
+TEST_F(Commands, OfBothAxesEachIsTold) {
+  board_->axis1_limit = static_cast<std::uint8_t>(wire::Limit::core_hot);
+  const auto both = json("run \"2A 0.5s\" --axis both");
+  EXPECT_EQ(both["axis0"]["held_back_s"], 0.0);
+  EXPECT_GT(both["axis1"]["held_back_s"], 0.4);
+  EXPECT_EQ(both["axis1"]["limit"], "core_hot");
+  const std::string out = say("run \"2A 0.5s\" --axis both").out;
+  EXPECT_NE(out.find("Axis 0: done in 0.5"), std::string::npos) << out;
+  EXPECT_NE(out.find("Axis 1: done in 0.5"), std::string::npos) << out;
+  EXPECT_NE(out.find("because the winding is close to its limit"), std::string::npos) << out;
+}
+
 TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   EXPECT_EQ(json("mode")["axis1"]["control"], "current");
   EXPECT_EQ(json("mode torque --axis 1")["axis1"]["control"], "torque");
