@@ -149,6 +149,17 @@ std::string sentence_of(const wire::Outlook& outlook) {
       outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
 }
 
+/// The board looks at heat alone, and would say yes to what its axis never gives.
+void need_within_limit(Console& console, int axis, const std::vector<wire::Segment>& segments) {
+  const std::string name = fmt::format("axis{}.current_limit_A", axis);
+  const float limit_A = console.session().get(console.session().parameters().named(name)).front();
+  for (const wire::Segment& segment : segments) {
+    if (!(std::fabs(segment.current_A) > limit_A)) continue;
+    refuse(fmt::format("{:g} A is more than the axis ever gives, {} is {:g}; ask for less.", segment.current_A, name,
+                       limit_A));
+  }
+}
+
 /// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
 /// as much, unless the caller knows that it turns.
 void ask(Console& console, const std::string& axis, const std::string& course, bool turns) {
@@ -165,6 +176,7 @@ void ask(Console& console, const std::string& axis, const std::string& course, b
                        wire::longest_ask_s));
   }
   const int index = axis == "1" ? 1 : 0;
+  need_within_limit(console, index, segments);
   const wire::Outlook standing = console.session().ask(index, segments, true);
   const wire::Outlook turning = console.session().ask(index, segments, false);
   const bool stands = standing.feasible != 0, goes = turning.feasible != 0;
