@@ -107,9 +107,13 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
       console.say("", json);
       continue;
     }
-    const std::string text = curves.drawn(terminal_width(), 8, on_terminal());
-    if (on_terminal() && lines > 0) fmt::print("\033[{}A\033[J", lines);
-    lines = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    std::string text = curves.drawn(terminal_width(), 8, on_terminal());
+    if (on_terminal()) {
+      if (lines > 0) fmt::print("\033[{}A\033[J", lines);
+      const TerminalSize size = terminal_size();
+      const Fitted shown = fitted(text, size.columns, size.rows);
+      text = shown.text, lines = shown.rows;
+    }
     console.say(text, {});
   }
   session.unsubscribe();

@@ -246,6 +246,12 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
   EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Not in full, standing or turning."), 0u);
 }
 
+TEST_F(Commands, AskSaysNoYesToWhatTheAxisNeverGives) {
+  ASSERT_EQ(say("set axis1.current_limit_A=12").code, 0);
+  refused("ask \"1A 1s, -13A 1ms\" --axis 1", 2, "-13 A is more than the axis ever gives, axis1.current_limit_A is 12");
+  EXPECT_EQ(say("ask \"13A 1ms\" --axis 0").code, 0);
+}
+
 TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }
 
 TEST_F(Commands, WatchGivesALineForEachState) {
@@ -655,6 +661,15 @@ TEST(Plot, TheScaleHasItsUnitEndsAtRoundNumbersAndOnlyGrows) {
     EXPECT_TRUE(scale.low <= double{60 - value} && scale.high >= double{value}) << value;
     low = scale.low, high = scale.high;
   }
+}
+
+TEST(Plot, WhatIsDrawnAgainFitsItsTerminal) {
+  const std::string text = std::string(110, 'x') + "\n\033[36m\xe2\xa3\xbf\xe2\xa3\xbf\033[0m\n\nlast\n";
+  EXPECT_EQ(console::fitted(text, 110, 24).rows, 4);
+  EXPECT_EQ(console::fitted(text, 80, 24).rows, 5);  // the long line goes on below
+  EXPECT_EQ(console::fitted(text, 2, 1000).rows, 55 + 1 + 1 + 2);
+  EXPECT_EQ(console::fitted(text, 80, 24).text, text);
+  EXPECT_EQ(console::fitted(text, 80, 5).text, text.substr(0, text.size() - 5));  // the cursor stands in the last row
 }
 
 }  // namespace
