@@ -64,10 +64,16 @@ std::string shown(float value) { return std::isnan(value) ? "unset" : fmt::forma
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-int terminal_width() {
+TerminalSize terminal_size() {
   winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= 40) return size.ws_col;
-  return 100;
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 && size.ws_row > 0)
+    return {size.ws_col, size.ws_row};
+  return {100, 1000};
+}
+
+int terminal_width() {
+  const int columns = terminal_size().columns;
+  return columns >= 40 ? columns : 100;
 }
 
 bool on_terminal() {

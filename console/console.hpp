@@ -62,6 +62,11 @@ std::string shown(float value);
 Json number(double value);
 /// Columns in a terminal, 100 elsewhere.
 int terminal_width();
+struct TerminalSize {
+  int columns, rows;
+};
+/// As it is; generous where nobody tells.
+TerminalSize terminal_size();
 /// Standard output is a terminal that understands colours and cursor movements.
 bool on_terminal();
 

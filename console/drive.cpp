@@ -59,10 +59,9 @@ void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
   }
 }
 
-Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
-             const std::function<void(const wire::State&, double)>& look) {
-  const int first = (mask & 1) != 0 ? 0 : 1;
-  Driven driven;
+std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+                                           Along along, const std::function<void(const wire::State&, double)>& look) {
+  std::array<Driven, wire::axis_count> all;
   const double start_s = session.now_s();
   double last_s = start_s, end_s = start_s, next_s = start_s;
   bool begun = false;
@@ -90,24 +89,26 @@ Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& prof
                                                      unit_of(piece.mode), text.happened, text.advice));
         }
       }
-      const wire::AxisReport& axis = state.axis[first];
-      if (!begun) driven.start_degC = axis.core_degC;
-      begun = true;
-      driven.peak_A = std::max(driven.peak_A, std::hypot(axis.id_A, axis.iq_A));
-      driven.peak_degC = std::max(driven.peak_degC, axis.core_degC);
-      driven.end_degC = axis.core_degC;
-      if (axis.limit != 0) {
+      for (std::size_t a = 0; a < all.size(); ++a) {
+        const wire::AxisReport& axis = state.axis[a];
+        Driven& driven = all[a];
+        if (!begun) driven.start_degC = axis.core_degC;
+        driven.peak_A = std::max(driven.peak_A, std::hypot(axis.id_A, axis.iq_A));
+        driven.peak_degC = std::max(driven.peak_degC, axis.core_degC);
+        driven.end_degC = axis.core_degC;
+        if (axis.limit == 0) continue;
         driven.held_back_s += now_s - last_s;
         driven.limit = axis.limit;
       }
+      begun = true;
       last_s = now_s;
       look(state, now_s - start_s);
       next_s = std::max(next_s + interval_s, now_s);
       session.wait_until(std::min(next_s, end_s));
     }
   }
-  driven.seconds = session.now_s() - start_s;
-  return driven;
+  for (Driven& driven : all) driven.seconds = session.now_s() - start_s;
+  return all;
 }
 
 }  // namespace console

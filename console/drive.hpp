@@ -2,6 +2,7 @@
 // Moving a motor from the console: arm, send setpoints often enough, and disarm whatever happens.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -42,11 +43,12 @@ struct Driven {
 /// all the same is held by a little iq.
 enum class Along { q, d };
 
-/// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. Throws UserError: refused
+/// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. What it came to is told of
+/// these axes. Throws UserError: refused
 /// when an axis trips or refuses a setpoint (as one that has another control mode does), interrupted after Ctrl-C,
 /// gone. The caller holds an Armed.
-Driven drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile, Along along,
-             const std::function<void(const wire::State&, double)>& look);
+std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
+                                           Along along, const std::function<void(const wire::State&, double)>& look);
 
 /// The sentence of a fault: what happened, evidence, advice. Empty for none.
 std::string fault_sentence(const wire::FaultEvidence& evidence);

@@ -23,6 +23,25 @@ double value_of(const Values& values, const std::string& name) {
   return double{at->second};
 }
 
+/// What would take the motor for cooler than the board does.
+void leave_out_cooler(Offer& offer, const Values& before) {
+  constexpr struct {
+    const char* name;
+    float towards_cool;
+  } rules[] = {{"R2_K_per_W", -1}, {"C2_J_per_K", 1}, {"housing_offset_K", 1}};
+  std::vector<std::string> left_out;
+  for (const auto& [name, towards_cool] : rules) {
+    const auto found = offer.values.find(name);
+    if (found == offer.values.end() || !(towards_cool * (found->second - before.at(name)) > 0)) continue;
+    left_out.push_back(fmt::format("{} {:.6g}", name, found->second));
+    offer.values.erase(found);
+  }
+  if (left_out.empty()) return;
+  offer.note += fmt::format(
+      "; left out, since it takes the motor for cooler and nobody told how warm the room was (--ambient DEGC): {}",
+      fmt::join(left_out, ", "));
+}
+
 }  // namespace
 
 double continuous_A(const Values& values) {
@@ -110,7 +129,8 @@ Values parameters_of_model(const std::string& path, std::string& why) {
   return found;
 }
 
-Offer offer(const nlohmann::json& answer, const std::string& model_path, double housing_noise_K) {
+Offer offer(const nlohmann::json& answer, const std::string& model_path, const Values& before, bool room_told) {
+  const double housing_noise_K = value_of(before, "housing_noise_K");
   Offer offer;
   std::string why;
   if (answer.is_object() && answer.value("verdict", std::string()) == "insufficient") {
@@ -140,6 +160,7 @@ Offer offer(const nlohmann::json& answer, const std::string& model_path, double 
   offer.values.erase("R1_K_per_W");
   offer.values.erase("C1_J_per_K");
   offer.note += "; R1 and C1 stay: a housing sensor alone does not tell the winding well enough";
+  if (!room_told) leave_out_cooler(offer, before);
   return offer;
 }
 

@@ -40,7 +40,8 @@ struct Offer {
 /// housing that hardly feels them: a small effect outside the model moves them by tens of percent, to the cold side as
 /// well, so they are never offered. If the model found has more than parameters can express, R2 and C2 of the plain
 /// two-resistor fit are, provided that it misses the housing by less than `housing_noise_K`, which the board grants
-/// anyway.
-Offer offer(const nlohmann::json& answer, const std::string& model_path, double housing_noise_K);
+/// anyway. Unless the room was told, nothing is offered that takes the motor for cooler than `before`: from a log that
+/// begins above its room it seems to cool better than it does, at 20 K twice as well.
+Offer offer(const nlohmann::json& answer, const std::string& model_path, const Values& before, bool room_told);
 
 }  // namespace console

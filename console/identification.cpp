@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "console/commands.hpp"
 #include "console/drive.hpp"
@@ -44,7 +45,10 @@ void run_identify(std::vector<std::string> arguments, const std::string& json, b
   int status = 0;
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  const int code = child > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 127;
+  stop_if_interrupted("Stopped while identify worked; nothing was written, the log is kept.");
+  if (child > 0 && WIFSIGNALED(status))
+    refuse_data(fmt::format("identify was killed by signal {}; the log is kept, run it by hand.", WTERMSIG(status)));
+  const int code = child > 0 ? WEXITSTATUS(status) : 127;
   if (code == 127) refuse_data("The program identify was not found; build it or put it beside hotcore.");
   if (code != 0 && !std::filesystem::exists(json))
     refuse_data("identify could not use the log; its sentence stands above, the log is kept.");
@@ -64,6 +68,7 @@ Values values_of(Session& session, int axis) {
 struct Arguments {
   std::string axis = "0", out = "out/identify";
   double minutes = 20;
+  std::optional<double> ambient_degC;
   bool yes = false, save = false, force = false;
 };
 
@@ -79,14 +84,15 @@ Driven record(Console& console, int axis, const std::vector<Piece>& course, cons
   try {
     {
       Armed armed(session, mask);
-      driven = drive(session, mask, course, Along::d, [&](const wire::State& state, double time_s) {
+      const auto look = [&](const wire::State& state, double time_s) {
         if (time_s - told_s < length_s / 10) return;
         told_s = time_s;
         console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed",
                                  100 * time_s / length_s, state.axis[axis].core_degC,
                                  std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
                                  state.axis[axis].allowance_A));
-      });
+      };
+      driven = drive(session, mask, course, Along::d, look)[static_cast<std::size_t>(axis)];
     }
     recorder.finish();
   } catch (const UserError& error) {
@@ -120,21 +126,24 @@ void identify(Console& console, const Arguments& a) {
   const double rated_A = continuous_A(before);
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
-  console.tell(
-      fmt::format("Heating axis {} for {:g} min with up to {:.1f} A along the magnet, which makes no torque; the shaft "
-                  "must be free to stand still. Ctrl-C disarms.",
-                  axis, a.minutes, 2.5 * rated_A));
+  console.tell(fmt::format(
+      "Heating axis {} for {:g} min with up to {:.1f} A along the magnet, which makes no torque; the shaft "
+      "must be free to stand still. Ctrl-C disarms.{}",
+      axis, a.minutes, 2.5 * rated_A,
+      a.ambient_degC ? "" : " Without --ambient DEGC the room is taken to be as warm as the motor is now."));
   const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
   std::filesystem::remove(model);  // of an earlier run
-  run_identify({log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"}, json,
-               console.options.json);
+  std::vector<std::string> words = {
+      log, "--motor", sheet, "--json", json, "--write-model", model, "--html", a.out + "/report.html"};
+  if (a.ambient_degC) words.insert(words.end(), {"--ambient", fmt::format("{}", *a.ambient_degC)});
+  run_identify(words, json, console.options.json);
 
   std::ifstream in(json);
   const auto answer = nlohmann::json::parse(in, nullptr, false);
   if (!answer.is_object()) refuse_data(json + ": identify left no answer there; run it on the log by hand.");
   const std::string sentence = answer.value("sentence", std::string());
-  const Offer offered = offer(answer, model, double{before.at("housing_noise_K")});
+  const Offer offered = offer(answer, model, before, a.ambient_degC.has_value());
   std::string text = sentence + "\n";
   Json changes = Json::object();
   std::vector<Assignment> assignments;
@@ -170,7 +179,8 @@ void identify(Console& console, const Arguments& a) {
     result["saved"] = a.save;
     text = a.save ? "In force and saved.\n" : "In force until the next reset; 'hotcore save' keeps it.\n";
   } else {
-    text = "Nothing was written; --yes writes without asking.\n";
+    text = assignments.empty() ? "Nothing to write: the board has these values already.\n"
+                               : "Nothing was written; --yes writes without asking.\n";
   }
   console.say(text, result);
 }
@@ -185,6 +195,9 @@ void add_identify(CLI::App& app, Console& console) {
   command->add_option("--minutes", a->minutes, "length of the course")
       ->capture_default_str()
       ->check(between(1.0, 240.0));
+  command
+      ->add_option("--ambient", a->ambient_degC, "how warm the room is, degC; else what the motor begins at is taken")
+      ->check(between(-40, 55));
   command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
   command->add_flag("--yes", a->yes, "write what was found without asking");
   command->add_flag("--save", a->save, "and keep it over a reset");

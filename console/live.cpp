@@ -91,8 +91,10 @@ void Live::show(const wire::State& state, double time_s) {
     }
     // Up over what was drawn last, then each line over the old one; \033[K clears what the old one had more.
     std::string drawn = lines_ > 0 ? fmt::format("\033[{}A", lines_) : "";
-    for (const char c : text) drawn += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
-    lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    const TerminalSize size = terminal_size();
+    const Fitted shown = fitted(text, size.columns, size.rows);
+    for (const char c : shown.text) drawn += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
+    lines_ = shown.rows;
     text = drawn;
   } else {
     lines_ = 1;  // the header stands

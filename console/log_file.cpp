@@ -10,6 +10,7 @@
 
 #include "console/live.hpp"
 #include "console/parameter_file.hpp"
+#include "wire/pc/files.hpp"
 
 namespace console {
 
@@ -60,15 +61,18 @@ std::string preamble(Session& session, const std::string& what, const std::vecto
 }
 
 LogFile::LogFile(const std::string& path, const std::string& preamble, const std::vector<std::string>& columns)
-    : path_(path), unfinished_(path + ".part") {
+    : path_(path), unfinished_(wire::pc::unfinished(path)) {
+  const std::string head = fmt::format("{}time_s,{}\n", preamble, fmt::join(columns, ","));
   out_.open(unfinished_, std::ios::binary);
-  out_ << preamble << "time_s," << fmt::format("{}", fmt::join(columns, ",")) << "\n";
+  out_ << head << std::flush;
   if (!out_) refuse(path + ": cannot be written; choose another folder or make room.");
+  whole_bytes_ = head.size();
 }
 
 LogFile::~LogFile() {
   if (finished_) return;
   out_.close();
+  if (unfinished_ == path_) return;
   std::error_code ignored;
   if (rows_ > 0)
     std::filesystem::rename(unfinished_, path_, ignored);
@@ -77,9 +81,17 @@ LogFile::~LogFile() {
 }
 
 void LogFile::add(double time_s, const std::vector<float>& values) {
+  if (!out_) return;
   std::string row = fmt::format("{:.6f}", time_s);
   for (const float v : values) row += std::isnan(v) ? std::string(",") : fmt::format(",{:.7g}", v);
-  out_ << row + "\n";
+  row += "\n";
+  out_ << row << std::flush;  // so that who is killed leaves the rows until then, and a full disk is seen at once
+  if (!out_) {
+    std::error_code ignored;
+    if (unfinished_ != path_) std::filesystem::resize_file(unfinished_, whole_bytes_, ignored);
+    refuse(path_ + ": the disk is full; make room and log again.");
+  }
+  whole_bytes_ += row.size();
   ++rows_;
   last_s_ = time_s;
 }
@@ -87,17 +99,19 @@ void LogFile::add(double time_s, const std::vector<float>& values) {
 void LogFile::finish() {
   out_.close();
   if (!out_) refuse(path_ + ": the disk is full; make room and log again.");
+  finished_ = true;
+  if (unfinished_ == path_) return;
   std::error_code error;
   std::filesystem::rename(unfinished_, path_, error);
-  if (error) refuse(path_ + ": cannot be written (" + error.message() + "); choose another place.");
-  finished_ = true;
+  if (error) refuse(path_ + ": cannot be written (" + error.message() + "); its rows are in " + unfinished_ + ".");
 }
 
 void LogFile::end(const UserError& error) const {
-  if (error.exit_code() != static_cast<int>(Exit::gone) || rows_ == 0) throw error;
+  if (rows_ == 0 || finished_) throw error;
   std::string sentence = error.what();
   if (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
-  throw UserError(Exit::gone, fmt::format("{}; {} holds the {} rows until then.", sentence, path_, rows_));
+  throw UserError(static_cast<Exit>(error.exit_code()),
+                  fmt::format("{}; {} holds the {} rows until then.", sentence, path_, rows_));
 }
 
 double BoardTime::at(std::uint32_t period) {

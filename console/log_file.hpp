@@ -4,6 +4,7 @@
 // it is.
 #pragma once
 
+#include <cstdint>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -29,17 +30,20 @@ class LogFile {
   LogFile(const LogFile&) = delete;
   LogFile& operator=(const LogFile&) = delete;
 
+  /// Throws UserError (usage) once, with the first row for which there is no room; it and what comes later are left
+  /// out.
   void add(double time_s, const std::vector<float>& values);
-  int rows() const { return rows_; }
+  std::int64_t rows() const { return rows_; }
   double last_s() const { return last_s_; }
   void finish();
-  /// Throws `error` again; if the board went away, its sentence says what the file holds.
+  /// Throws `error` again; its sentence then says what the file holds.
   [[noreturn]] void end(const wire::pc::UserError& error) const;
 
  private:
   std::string path_, unfinished_;
   std::ofstream out_;
-  int rows_ = 0;
+  std::uintmax_t whole_bytes_ = 0;
+  std::int64_t rows_ = 0;
   double last_s_ = 0;
   bool finished_ = false;
 };

@@ -23,6 +23,20 @@ Json summary(const Driven& d) {
           {"limit", wire::text_of(d.limit).name}};
 }
 
+std::string told(const Driven& d, const std::string& whose) {
+  std::string text =
+      fmt::format("{} in {:.2f} s and disarmed: peak current {:.1f} A, core {:.1f} to {:.1f} degC",
+                  whose.empty() ? "Done" : whose + ": done", d.seconds, d.peak_A, d.start_degC, d.end_degC);
+  if (d.peak_degC > d.end_degC + 0.5f) text += fmt::format(" (peak {:.1f})", d.peak_degC);
+  text += ".\n";
+  if (d.held_back_s > 0.02) {
+    const wire::CodeText why = wire::text_of(d.limit);
+    text += fmt::format("Held back for {:.2f} s, at last because {}. What to do: {}.\n", d.held_back_s, why.happened,
+                        why.advice);
+  }
+  return text;
+}
+
 /// `once_armed`: told when the first setpoint was taken.
 void play(Console& console, const std::string& axis, const std::vector<Piece>& profile,
           const std::string& once_armed = "") {
@@ -30,26 +44,22 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
   const std::uint8_t mask = mask_of(axis);
   need_mode(console, mask, profile.front().mode);
   Live live(mask);
-  Driven driven;
+  std::array<Driven, wire::axis_count> driven;
   {
     Armed armed(session, mask);
-    bool told = once_armed.empty();
+    bool said = once_armed.empty();
     driven = drive(session, mask, profile, Along::q, [&](const wire::State& state, double time_s) {
-      if (!told) console.tell(once_armed);
-      told = true;
+      if (!said) console.tell(once_armed);
+      said = true;
       if (!console.options.json) live.show(state, time_s);
     });
   }
-  std::string text = fmt::format("Done in {:.2f} s and disarmed: peak current {:.1f} A, core {:.1f} to {:.1f} degC",
-                                 driven.seconds, driven.peak_A, driven.start_degC, driven.end_degC);
-  if (driven.peak_degC > driven.end_degC + 0.5f) text += fmt::format(" (peak {:.1f})", driven.peak_degC);
-  text += ".\n";
-  if (driven.held_back_s > 0.02) {
-    const wire::CodeText why = wire::text_of(driven.limit);
-    text += fmt::format("Held back for {:.2f} s, at last because {}. What to do: {}.\n", driven.held_back_s,
-                        why.happened, why.advice);
+  if (axis != "both") {
+    const Driven& one = driven[axis == "1" ? 1 : 0];
+    return console.say(told(one, ""), summary(one));
   }
-  console.say(text, summary(driven));
+  console.say(told(driven[0], "Axis 0") + told(driven[1], "Axis 1"),
+              {{"axis0", summary(driven[0])}, {"axis1", summary(driven[1])}});
 }
 
 /// Armed at a steady level until Ctrl-C or for so long.
@@ -139,6 +149,17 @@ std::string sentence_of(const wire::Outlook& outlook) {
       outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
 }
 
+/// The board looks at heat alone, and would say yes to what its axis never gives.
+void need_within_limit(Console& console, int axis, const std::vector<wire::Segment>& segments) {
+  const std::string name = fmt::format("axis{}.current_limit_A", axis);
+  const float limit_A = console.session().get(console.session().parameters().named(name)).front();
+  for (const wire::Segment& segment : segments) {
+    if (!(std::fabs(segment.current_A) > limit_A)) continue;
+    refuse(fmt::format("{:g} A is more than the axis ever gives, {} is {:g}; ask for less.", segment.current_A, name,
+                       limit_A));
+  }
+}
+
 /// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
 /// as much, unless the caller knows that it turns.
 void ask(Console& console, const std::string& axis, const std::string& course, bool turns) {
@@ -155,6 +176,7 @@ void ask(Console& console, const std::string& axis, const std::string& course, b
                        wire::longest_ask_s));
   }
   const int index = axis == "1" ? 1 : 0;
+  need_within_limit(console, index, segments);
   const wire::Outlook standing = console.session().ask(index, segments, true);
   const wire::Outlook turning = console.session().ask(index, segments, false);
   const bool stands = standing.feasible != 0, goes = turning.feasible != 0;

@@ -60,11 +60,13 @@ std::vector<Assignment> read_parameter_file(const std::string& path, const Dicti
       const std::string full = name == common ? std::string(key.str()) : name + "." + std::string(key.str());
       const auto value = node.value<double>();
       if (!value) refuse(fmt::format("{}: {} is no number; repair it.", path, full));
-      const std::vector<Target> targets = dictionary.named(full, path);
-      assignments.push_back({targets.front(), static_cast<float>(*value)});
-      if (!std::isnan(*value)) check(assignments.back(), path + ": ");
+      for (const Target& target : dictionary.named(full, path)) {
+        assignments.push_back({target, static_cast<float>(*value)});
+        if (!std::isnan(*value)) check(assignments.back(), path + ": ");
+      }
     }
   }
+  check_each_once(assignments, path + ": ");
   if (assignments.empty()) refuse(path + ": no parameter in it; 'hotcore backup FILE' writes such a file.");
   return assignments;
 }
@@ -78,6 +80,16 @@ void check(const Assignment& assignment, const std::string& where) {
   }
   if (what.whole_number && value != std::floor(value)) {
     refuse(fmt::format("{}{} = {:g} must be a whole number.", where, full_name(assignment.target), value));
+  }
+}
+
+void check_each_once(const std::vector<Assignment>& assignments, const std::string& where) {
+  for (std::size_t i = 0; i < assignments.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const Target &one = assignments[i].target, &other = assignments[k].target;
+      if (one.what == other.what && one.axis == other.axis)
+        refuse(fmt::format("{}{} is given twice; give it one value.", where, full_name(one)));
+    }
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Parameters of a board as a file that people read and edit (TOML): [board] says whose they are, [axis0], [axis1] and
-// [common] hold "name_unit = value". NaN (unset) is written as nan.
+// [common] hold "name_unit = value"; what is an axis' own means both axes in [common]. NaN (unset) is written as nan.
 #pragma once
 
 #include <string>
@@ -20,6 +20,9 @@ std::vector<Assignment> read_parameter_file(const std::string& path, const Dicti
 
 /// Throws UserError (usage) unless the value fits the range that the board declares.
 void check(const Assignment& assignment, const std::string& where);
+
+/// Throws UserError (usage) where a parameter of an axis has two values, of which either may be meant.
+void check_each_once(const std::vector<Assignment>& assignments, const std::string& where);
 
 /// CRC-32 over ids, axes and values: two boards with the same hash run the same parameters.
 std::uint32_t hash_of(const std::vector<Target>& targets, const std::vector<float>& values);

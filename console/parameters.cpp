@@ -91,13 +91,7 @@ void apply(Console& console, const std::vector<Assignment>& assignments, bool sa
 void set(Console& console, const std::vector<std::string>& texts, bool save) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) parse(text, console.session().parameters(), assignments);
-  for (std::size_t i = 0; i < assignments.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      const Target &one = assignments[i].target, &other = assignments[k].target;
-      if (one.what == other.what && one.axis == other.axis)
-        refuse(fmt::format("{} is given twice; give it one value.", full_name(one)));
-    }
-  }
+  check_each_once(assignments, "");
   apply(console, assignments, save);
 }
 

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace console {
 namespace {
@@ -109,6 +111,28 @@ std::string plot(const std::vector<PlotLine>& lines, Scale& scale, int width, in
     text += colours ? fmt::format("\033[{}m{}\033[0m", ansi_colours[l % ansi_colours.size()], label) : label;
   }
   return text + '\n';
+}
+
+Fitted fitted(const std::string& text, int columns, int rows) {
+  Fitted fit{"", 0};
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    int seen = 0;
+    bool escape = false;
+    for (const unsigned char c : line) {
+      if (c == '\033')
+        escape = true;
+      else if (escape)
+        escape = std::isalpha(c) == 0;
+      else if ((c & 0xC0) != 0x80)  // a character of UTF-8 begins
+        ++seen;
+    }
+    const int takes = std::max(1, (seen + columns - 1) / columns);
+    if (fit.rows + takes >= rows) break;
+    fit.text += line + "\n";
+    fit.rows += takes;
+  }
+  return fit;
 }
 
 }  // namespace console

@@ -24,4 +24,13 @@ struct Scale {
 /// newest value stands at the right edge; older values than fit are left out.
 std::string plot(const std::vector<PlotLine>& lines, Scale& scale, int width, int height, bool colours);
 
+struct Fitted {
+  std::string text;
+  int rows;
+};
+
+/// The lines of `text` that a terminal shows without scrolling, and the rows they take: what is drawn again has to go
+/// up so far. A line longer than a row goes on below.
+Fitted fitted(const std::string& text, int columns, int rows);
+
 }  // namespace console

@@ -22,7 +22,7 @@ class Recorder {
 
   double rate_Hz() const { return rate_Hz_; }
   const LogFile& file() const { return file_; }
-  int rows() const { return file_.rows(); }
+  std::int64_t rows() const { return file_.rows(); }
   double seconds() const { return file_.last_s(); }
   std::uint32_t dropped() const { return dropped_; }
 

@@ -107,9 +107,13 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
       console.say("", json);
       continue;
     }
-    const std::string text = curves.drawn(terminal_width(), 8, on_terminal());
-    if (on_terminal() && lines > 0) fmt::print("\033[{}A\033[J", lines);
-    lines = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    std::string text = curves.drawn(terminal_width(), 8, on_terminal());
+    if (on_terminal()) {
+      if (lines > 0) fmt::print("\033[{}A\033[J", lines);
+      const TerminalSize size = terminal_size();
+      const Fitted shown = fitted(text, size.columns, size.rows);
+      text = shown.text, lines = shown.rows;
+    }
     console.say(text, {});
   }
   session.unsubscribe();
@@ -218,7 +222,7 @@ void capture(Console& console, const CaptureArguments& a) {
       values.clear();
       next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values);
       for (std::size_t at = 0; at < values.size(); at += row.size()) {
-        const int periods = (file.rows() - status.pre) * status.decimation;
+        const auto periods = static_cast<double>((file.rows() - status.pre) * status.decimation);
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(at), row.size(), row.begin());
         file.add(periods / double{session.hello().pwm_Hz}, row);
         for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);

@@ -198,7 +198,7 @@ hal::Duty Axis::resting(const hal::AxisSample& sample, Dq current_A, std::uint32
   if (mode_ == Mode::running) {
     change(Event::stop);
     trace_.limit = wire::Limit::setpoint_old;
-  } else if (mode_ == Mode::ready && setpoint_.share() > 0.0f) {
+  } else if (mode_ == Mode::ready && setpoint_.share() > 0.0f && allowance_.current_A > 0.0f) {
     change(Event::start);
     current_loop_.reset();
   } else if (mode_ == Mode::off && std::fabs(rotor_.rad_per_s()) < quiet_rad_per_s_per_V_ * sample.bus_V) {
@@ -210,6 +210,7 @@ hal::Duty Axis::resting(const hal::AxisSample& sample, Dq current_A, std::uint32
   } else {
     offsets_.restart();
   }
+  if (mode_ == Mode::ready && setpoint_.share() > 0.0f) trace_.limit = allowance_.reason;
   if (mode_ == Mode::tripped && tripped_periods_ < forever - periods) tripped_periods_ += periods;
   return last_;
 }
@@ -272,6 +273,7 @@ void Axis::obey() {
     setpoint_.discard();
     change(Event::arm);
   }
+  if (asked_for(Command::rest) && mode_ == Mode::running) change(Event::stop);
   if (asked_for(Command::trip) && (mode_ == Mode::ready || mode_ == Mode::running)) (void)trip(doubted_);
 }
 
@@ -317,6 +319,8 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
   core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps_ - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
+  // A bridge that holds zero amperes heats a winding all the same, by ripple.
+  if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();
 }

@@ -172,7 +172,7 @@ class Axis {
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
 
-  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8, trip = 16 };
+  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8, trip = 16, rest = 32 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   void judge(const AxisSetup& setup);

@@ -56,6 +56,17 @@ TEST(ClosedLoop, ABlockedRotorIsSafeAtEveryAngle) {
   EXPECT_GT(hottest_degC, 150) << "the limit was never reached, so nothing was shown";
 }
 
+/// There the ripple of a bridge that holds zero amperes is more than a small motor can stand for ever.
+TEST(ClosedLoop, AFreeRotorAtTheVoltagesEndIsNotBurntByRipple) {
+  Scene scene =
+      boards::host::read_scene("stall", HOTCORE_SOURCE_DIR "/host-sim/scenes", {"seconds=60", "start_degC=152"});
+  scene.shaft.kind = boards::host::Shaft::Kind::free;
+  scene.demands = {{0, 0.5, 60, 2, 0, 0}};
+  const Result result = boards::host::run_scene(scene, {.motor_folder = HOTCORE_SOURCE_DIR "/boards/motors"});
+  expect_cool_and_unbroken(result, "free");
+  EXPECT_GT(result.traces[0].hottest_true_degC, 154) << "the limit was never reached, so nothing was shown";
+}
+
 TEST(ClosedLoop, TheLargeMotorIsSafeWhenBlockedOnTheLargeBoard) {
   for (const char* motor : {"motor=ec-powermax-30-24v", "motor=ec-powermax-30-48v"}) {
     for (int k = 0; k < 6; ++k) {

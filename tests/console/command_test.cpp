@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every command as a person types it, against a board made of a script.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <csignal>
 #include <filesystem>
@@ -107,6 +108,13 @@ TEST_F(Commands, BackupThenRestoreBringsEachBitBack) {
   EXPECT_EQ(board_->in_force, before);
 }
 
+TEST_F(Commands, WhatStandsInCommonIsOfBothAxes) {
+  std::ofstream(path("p.toml")) << "[common]\ncurrent_limit_A = 5\n";
+  const auto changed = json("restore " + path("p.toml"))["changed"];
+  EXPECT_EQ(changed["axis0.current_limit_A"]["after"], 5.0);
+  EXPECT_EQ(changed["axis1.current_limit_A"]["after"], 5.0);
+}
+
 TEST_F(Commands, DiffAgainstDefaults) {
   EXPECT_EQ(json("diff")["differences"].size(), 2u);  // the resistance that has no default, on both axes
   EXPECT_EQ(say("set axis0.current_limit_A=3").code, 0);
@@ -126,6 +134,18 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   EXPECT_EQ(board_->armed, 0);
   EXPECT_NEAR(json("run \"5A 0.2s, 0A 0.1s\" --times 3")["seconds"], 0.9, 0.02);
   refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
+}
+
+TEST_F(Commands, OfBothAxesEachIsTold) {
+  board_->axis1_limit = static_cast<std::uint8_t>(wire::Limit::core_hot);
+  const auto both = json("run \"2A 0.5s\" --axis both");
+  EXPECT_EQ(both["axis0"]["held_back_s"], 0.0);
+  EXPECT_GT(both["axis1"]["held_back_s"], 0.4);
+  EXPECT_EQ(both["axis1"]["limit"], "core_hot");
+  const std::string out = say("run \"2A 0.5s\" --axis both").out;
+  EXPECT_NE(out.find("Axis 0: done in 0.5"), std::string::npos) << out;
+  EXPECT_NE(out.find("Axis 1: done in 0.5"), std::string::npos) << out;
+  EXPECT_NE(out.find("because the winding is close to its limit"), std::string::npos) << out;
 }
 
 TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
@@ -224,6 +244,12 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
   EXPECT_FALSE(json("ask \"20A 0.3s\"")["feasible"]);
   board_->standing = board_->turning;
   EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Not in full, standing or turning."), 0u);
+}
+
+TEST_F(Commands, AskSaysNoYesToWhatTheAxisNeverGives) {
+  ASSERT_EQ(say("set axis1.current_limit_A=12").code, 0);
+  refused("ask \"1A 1s, -13A 1ms\" --axis 1", 2, "-13 A is more than the axis ever gives, axis1.current_limit_A is 12");
+  EXPECT_EQ(say("ask \"13A 1ms\" --axis 0").code, 0);
 }
 
 TEST_F(Commands, CalibrateTellsOffsets) { EXPECT_EQ(json("calibrate")["axis1"]["offset_A"].size(), 3u); }
@@ -354,6 +380,62 @@ TEST_F(Commands, AFileThatIsThereStaysUnlessForceIsSaid) {
   EXPECT_EQ(content(path("i/log.csv")), "old");
 }
 
+/// Left by a hotcore that was killed, or in the hands of one that runs.
+TEST_F(Commands, RowsThatWaitForTheirNameAreNotWrittenOver) {
+  std::ofstream(path("x.csv.part")) << "old";
+  refused("log --seconds 0.1 --out " + path("x.csv"), 2, "x.csv.part: another hotcore writes it now, or was killed");
+  EXPECT_EQ(content(path("x.csv.part")), "old");
+  EXPECT_EQ(say("log --force --seconds 0.1 --out " + path("x.csv")).code, 0);
+}
+
+TEST_F(Commands, AFullDiskEndsALogAtOnceAndLeavesWholeRows) {
+  rlimit usual{};
+  getrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit full = usual;
+  full.rlim_cur = 10'000;
+  setrlimit(RLIMIT_FSIZE, &full);
+  const Said said = say("log --out " + path("x.csv") + " --seconds 1000");
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(said.code, 2);
+  EXPECT_LT(board_->now_s, 100);
+  const std::string text = content(path("x.csv"));
+  EXPECT_GT(text.size(), 9'000u);
+  EXPECT_EQ(text.back(), '\n');
+  const auto rows = std::count(text.begin(), text.end(), '\n') - std::count(text.begin(), text.end(), '#') - 1;
+  EXPECT_NE(said.err.find("the disk is full; make room and log again; " + path("x.csv") + " holds the " +
+                          std::to_string(rows) + " rows until then.\n"),
+            std::string::npos)
+      << said.err << rows;
+}
+
+TEST_F(Commands, ADeviceIsWrittenToAndNotPutAway) {
+  for (const char* device : {"/dev/full", "/dev/null"}) {
+    const std::string link = path(std::string(device).substr(5));
+    std::filesystem::create_symlink(device, link);
+    for (const std::string line : {"log --seconds 0.1 --out ", "capture axis0.iq_A --out ", "backup "}) {
+      const Said said = say(line + link);
+      EXPECT_EQ(said.code, device == std::string("/dev/full") ? 2 : 0) << line << said.err;
+      EXPECT_TRUE(std::filesystem::is_symlink(link)) << line;
+    }
+  }
+}
+
+TEST_F(Commands, WhateverEndsALogItsRowsAreTold) {
+  const std::string place = path("x.csv");
+  console::LogFile file(place, "", {"iq_A"});
+  const wire::pc::UserError stopped(wire::pc::Exit::interrupted, "Stopped and disarmed.");
+  EXPECT_THROW(file.end(stopped), wire::pc::UserError);
+  file.add(0.0, {1.0f});
+  try {
+    file.end(stopped);
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_EQ(error.what(), "Stopped and disarmed; " + place + " holds the 1 rows until then.");
+    EXPECT_EQ(error.exit_code(), 130);
+  }
+}
+
 TEST_F(Commands, AFolderThatIsMissingIsToldAndNotMade) {
   for (const std::string line : {"log --seconds 0.1 --out ", "capture axis0.iq_A --out ", "backup "}) {
     refused(line + path("no/x"), 2, "no/x: there is no folder " + path("no") + "; make it, or choose another place.");
@@ -474,6 +556,8 @@ TEST_F(Commands, FilesThatAreWrongAreNamed) {
   refused("restore " + path("p.toml"), 2, "is no number");
   write("[axis0\n");
   refused("restore " + path("p.toml"), 2, "p.toml");
+  write("[axis1]\ncurrent_limit_A = 5\n[common]\ncurrent_limit_A = 7\n");
+  refused("restore " + path("p.toml"), 2, "p.toml: axis1.current_limit_A is given twice; give it one value.");
   write("");
   refused("restore " + path("p.toml"), 2, "no parameter in it");
 }
@@ -577,6 +661,15 @@ TEST(Plot, TheScaleHasItsUnitEndsAtRoundNumbersAndOnlyGrows) {
     EXPECT_TRUE(scale.low <= double{60 - value} && scale.high >= double{value}) << value;
     low = scale.low, high = scale.high;
   }
+}
+
+TEST(Plot, WhatIsDrawnAgainFitsItsTerminal) {
+  const std::string text = std::string(110, 'x') + "\n\033[36m\xe2\xa3\xbf\xe2\xa3\xbf\033[0m\n\nlast\n";
+  EXPECT_EQ(console::fitted(text, 110, 24).rows, 4);
+  EXPECT_EQ(console::fitted(text, 80, 24).rows, 5);  // the long line goes on below
+  EXPECT_EQ(console::fitted(text, 2, 1000).rows, 55 + 1 + 1 + 2);
+  EXPECT_EQ(console::fitted(text, 80, 24).text, text);
+  EXPECT_EQ(console::fitted(text, 80, 5).text, text.substr(0, text.size() - 5));  // the cursor stands in the last row
 }
 
 }  // namespace

@@ -48,6 +48,7 @@ struct FakeBoard {
   bool unplugged = false;
   std::uint8_t fault = 0;
   float temperature_degC = 30.0f;
+  std::uint8_t axis1_limit = 0;
   wire::FaultEvidence evidence{};
   wire::Outlook standing{{}, 0, {}, 171.0f, 0.21f, 0.8f}, turning{{}, 1, {}, 98.0f, INFINITY, 1.0f};
   /// Sees each request before it is answered; false: no answer comes.
@@ -120,6 +121,7 @@ struct FakeBoard {
       axis.housing_degC = 28.0f;
       axis.allowance_A = 17.0f;
     }
+    s.axis[1].limit = axis1_limit;
     return s;
   }
 

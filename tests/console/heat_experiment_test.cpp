@@ -23,6 +23,8 @@ console::Values believed() {
           {"C2_J_per_K", 18.04f},
           {"winding_max_degC", 155.0f},
           {"ambient_degC", 40.0f},
+          {"housing_noise_K", 0.5f},
+          {"housing_offset_K", 0.0f},
           {"copper_coefficient_per_K", 0.00393f}};
 }
 
@@ -115,7 +117,7 @@ nlohmann::json answer(double miss_K, bool determined) {
 }
 
 TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
-  const auto offered = console::offer(answer(0.1, true), file("model.toml", two_resistors), 0.5);
+  const auto offered = console::offer(answer(0.1, true), file("model.toml", two_resistors), believed(), true);
   const console::Values expected = {{"C2_J_per_K", 20.0f},
                                     {"R2_K_per_W", 10.0f},
                                     {"copper_coefficient_per_K", 0.004f},
@@ -127,19 +129,34 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
 TEST(HeatExperiment, OfALogThatCannotTellNothingIsOffered) {
   nlohmann::json insufficient = answer(0.1, true);
   insufficient["verdict"] = "insufficient";
-  const auto offered = console::offer(insufficient, file("model.toml", two_resistors), 0.5);
+  const auto offered = console::offer(insufficient, file("model.toml", two_resistors), believed(), true);
   EXPECT_TRUE(offered.values.empty());
   EXPECT_NE(offered.note.find("cannot tell"), std::string::npos) << offered.note;
+}
+
+/// A log that begins above its room makes R2 too small and C2 too large, and says nothing of an offset.
+TEST(HeatExperiment, NothingCoolerIsOfferedUnlessTheRoomIsTold) {
+  console::Values before = believed();
+  before["housing_offset_K"] = -2.0f;
+  const std::string cooler = file("model.toml", two_resistors);  // R2 10 K/W, C2 20 J/K, no offset
+  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, true).values.size(), 5u);
+  const auto offered = console::offer(answer(0.1, true), cooler, before, false);
+  const console::Values left = {{"copper_coefficient_per_K", 0.004f}, {"housing_lag_s", 0.0f}};
+  EXPECT_EQ(offered.values, left);
+  EXPECT_NE(offered.note.find("(--ambient DEGC): R2_K_per_W 10, C2_J_per_K 20, housing_offset_K 0"), std::string::npos)
+      << offered.note;
+  before["R2_K_per_W"] = 9.0f, before["C2_J_per_K"] = 21.0f, before["housing_offset_K"] = 0.0f;
+  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, false).values.size(), 5u);
 }
 
 TEST(HeatExperiment, BeyondTheBoardsModelOnlyASmallMissIsForgiven) {
   const std::string model =
       file("model.toml", two_resistors + "[[source]]\nnode = 1\ndrive = \"speed_rad_per_s\"\ngain = 0.1\n");
   const console::Values housing = {{"C2_J_per_K", 16.8f}, {"R2_K_per_W", 16.6f}};
-  EXPECT_EQ(console::offer(answer(0.18, true), model, 0.5).values, housing);
-  EXPECT_TRUE(console::offer(answer(0.18, false), model, 0.5).values.empty());
-  EXPECT_TRUE(console::offer(answer(0.9, true), model, 0.5).values.empty());
-  EXPECT_TRUE(console::offer(nlohmann::json(), model, 0.5).values.empty());
+  EXPECT_EQ(console::offer(answer(0.18, true), model, believed(), true).values, housing);
+  EXPECT_TRUE(console::offer(answer(0.18, false), model, believed(), true).values.empty());
+  EXPECT_TRUE(console::offer(answer(0.9, true), model, believed(), true).values.empty());
+  EXPECT_TRUE(console::offer(nlohmann::json(), model, believed(), true).values.empty());
 }
 
 }  // namespace

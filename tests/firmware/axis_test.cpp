@@ -70,7 +70,7 @@ struct Rig {
       tick(motor.sample());
       if (ticks % 20 == 0) driver.watch();
       if (ticks % 200 == 0 && slow_lane_alive)
-        driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{housing_degC, housing_ok}}, {{25.0f, true}}});
+        driver.slow_tick({{stage_degC, true}, 0.0f, false}, {{{housing_degC, housing_ok}}, {{25.0f, true}}});
     }
   }
   void tick(const hal::AxisSample& sample) {
@@ -103,7 +103,7 @@ struct Rig {
   bench::Motor motor;
   hal::Duty duty{};
   int ticks = 0;
-  float housing_degC = 25.0f;
+  float housing_degC = 25.0f, stage_degC = 25.0f;
   bool housing_ok = true, slow_lane_alive = true;
 };
 
@@ -428,7 +428,10 @@ TEST(Axis, NoBitPatternInASampleMakesADutyThatIsNone) {
       ASSERT_LE(ratio, 1.0f) << i;
     }
     rig.motor.id_A = rig.motor.iq_A = 0.0;
-    if (i % 200 == 0) rig.driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    if (i % 200 == 0) {
+      rig.driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+      AxisProbe::damage(rig.axis(), 0, 20.0f);  // such currents look hot, and nothing would be allowed again
+    }
     ran += duty.on;
     if (rig.axis().mode() == Mode::tripped) {
       ++tripped;
@@ -714,10 +717,27 @@ TEST(Axis, AnotherSetAllowsNothingBeforeTheSlowLaneHasSeenIt) {
     ASSERT_EQ(rig.axis().arm(), Status::done);
     rig.run(1);
     rig.hold({0.0f, 5.0f}, 200);
-    ASSERT_EQ(rig.axis().mode(), Mode::running);
+    EXPECT_EQ(rig.axis().mode(), Mode::ready);
     EXPECT_EQ(rig.axis().fast().permitted_A.q, 0.0f);
+    EXPECT_EQ(rig.axis().fast().limit, Limit::thermal_late);
     rig.axis().disarm();
     rig.run(1);
+  }
+}
+
+/// Zero amperes are held by a bridge that switches, and its ripple heats.
+TEST_F(Running, ABridgeIsOpenWhileNothingIsAllowedAndGoesOnAfterwards) {
+  for (const float asked_A : {5.0f, 0.0f}) {
+    stage_degC = 101.0f;  // but little too hot: it is believed to be cool enough within 4 s
+    hold({0.0f, asked_A}, 2000);
+    ASSERT_EQ(axis().state().allowance_A, 0.0f);
+    EXPECT_FALSE(duty.on);
+    EXPECT_EQ(axis().mode(), Mode::ready);
+    EXPECT_EQ(axis().fast().limit, Limit::board_hot) << "why it stands must be told";
+    stage_degC = 25.0f;
+    hold({0.0f, asked_A}, 80000);
+    EXPECT_TRUE(duty.on);
+    EXPECT_EQ(axis().mode(), Mode::running);
   }
 }
 

@@ -11,29 +11,38 @@
 
 namespace wire::pc {
 
-/// Writes `text` beside `path` and renames it into place: whoever reads `path` sees the old file or the new one. A
-/// device or a pipe is written to and stays what it is. Makes the folder if it is missing. Throws UserError (usage)
-/// when the place cannot be written.
+/// A device, a pipe or a link is written to and stays what it is: a file that takes its name would put it away.
+inline bool stays(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::is_symlink(path, error)) return true;
+  return fs::exists(path, error) && !fs::is_regular_file(path, error) && !fs::is_directory(path, error);
+}
+
+/// Where `path` is written until it is whole.
+inline std::string unfinished(const std::string& path) { return stays(path) ? path : path + ".part"; }
+
+/// Writes `text` beside `path` and renames it into place: whoever reads `path` sees the old file or the new one. Makes
+/// the folder if it is missing. Throws UserError (usage) when the place cannot be written.
 inline void write_whole(const std::string& path, const std::string& text) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();
   if (!folder.empty()) fs::create_directories(folder, error);
-  const bool stays = fs::exists(path, error) && !fs::is_regular_file(path, error) && !fs::is_directory(path, error);
-  const std::string unfinished = stays ? path : path + ".part";
+  const std::string part = unfinished(path);
   {
-    std::ofstream out(unfinished, std::ios::binary);
+    std::ofstream out(part, std::ios::binary);
     out << text;
     out.flush();
     if (!out) {
-      if (!stays) std::remove(unfinished.c_str());
+      if (part != path) std::remove(part.c_str());
       throw UserError(Exit::usage, path + ": cannot be written; choose another folder or make room.");
     }
   }
-  if (stays) return;
-  fs::rename(unfinished, path, error);
+  if (part == path) return;
+  fs::rename(part, path, error);
   if (error) {
-    std::remove(unfinished.c_str());
+    std::remove(part.c_str());
     throw UserError(Exit::usage, path + ": cannot be written (" + error.message() + "); choose another place.");
   }
 }
@@ -50,6 +59,10 @@ inline void need_new_file(const std::string& path, bool force) {
   if (fs::is_directory(path, error)) refuse(path + ": this is a folder; name a file in it.");
   if (!force && fs::is_regular_file(path, error))
     refuse(path + ": there is such a file already; choose another name, or say --force to write over it.");
+  if (!force && fs::is_regular_file(path + ".part", error))
+    refuse(path +
+           ".part: another hotcore writes it now, or was killed while it did; move it away, or say --force to "
+           "write over it.");
 }
 
 }  // namespace wire::pc
