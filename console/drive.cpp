@@ -68,7 +68,7 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
   float hold_A[wire::axis_count]{};
   for (const Piece& piece : profile) {
     end_s += double{piece.seconds};
-    while (session.now_s() < end_s) {
+    do {  // once at least: what is told is what the board said
       stop_if_interrupted("Stopped and disarmed.");
       const bool turning = along == Along::q;
       const float d_A = turning ? 0 : piece.level, q = turning ? piece.level : 0;
@@ -92,7 +92,7 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
       for (std::size_t a = 0; a < all.size(); ++a) {
         const wire::AxisReport& axis = state.axis[a];
         Driven& driven = all[a];
-        if (!begun) driven.start_degC = axis.core_degC;
+        if (!begun) driven.start_degC = driven.peak_degC = axis.core_degC;
         driven.peak_A = std::max(driven.peak_A, std::hypot(axis.id_A, axis.iq_A));
         driven.peak_degC = std::max(driven.peak_degC, axis.core_degC);
         driven.end_degC = axis.core_degC;
@@ -105,7 +105,7 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
       look(state, now_s - start_s);
       next_s = std::max(next_s + interval_s, now_s);
       session.wait_until(std::min(next_s, end_s));
-    }
+    } while (session.now_s() < end_s);
   }
   for (Driven& driven : all) driven.seconds = session.now_s() - start_s;
   return all;

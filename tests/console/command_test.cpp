@@ -136,6 +136,16 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
+TEST_F(Commands, NoTemperatureIsToldThatTheBoardDidNotSay) {
+  for (const std::string line : {"arm --seconds 0", "run \"1A 0.0000001ms\""}) {
+    const auto shortest = json(line);
+    EXPECT_EQ(shortest["core_start_degC"], 30.0) << line;
+    EXPECT_EQ(shortest["core_peak_degC"], 30.0) << line;
+  }
+  board_->temperature_degC = -10.0f;
+  EXPECT_EQ(json("run \"1A 0.1s\"")["core_peak_degC"], -10.0);
+}
+
 TEST_F(Commands, OfBothAxesEachIsTold) {
   board_->axis1_limit = static_cast<std::uint8_t>(wire::Limit::core_hot);
   const auto both = json("run \"2A 0.5s\" --axis both");
