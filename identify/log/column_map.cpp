@@ -147,7 +147,9 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
 std::string unit_in_row(const Table& table, const std::string& column) {
   std::string unit = table.units.empty() ? "" : table.units[index_of(table, {column})];
   if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
-  return unit;
+  // How a date is written, "dd.MM.yyyy HH:mm:ss", or that it is one (TS, as Campbell's loggers say) is no unit.
+  const std::string low = in_small(unit);
+  return low == "ts" || low.find("yy") != low.npos || low.find("hh") != low.npos ? "" : unit;
 }
 
 /// Beside others in Fahrenheit a temperature without a unit is hardly in Celsius.

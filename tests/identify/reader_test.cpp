@@ -161,6 +161,16 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n"), "unknown unit 'Arms'");
 }
 
+TEST(Reader, HowADateIsWrittenIsNoUnit) {
+  for (const char* format : {"dd.MM.yyyy HH:mm:ss", "TS", "[hh:mm:ss]"}) {
+    const std::string text = std::string("time_s;current_A;housing_degC\n") + format +
+                             ";mA;degC\n21.11.2026 10:00:00;1000;20\n21.11.2026 10:00:01;2000;21\n";
+    const auto logs = read(text);
+    EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 1})) << format;
+    EXPECT_EQ(logs[0].of(Role::current)[1], 2) << format;
+  }
+}
+
 TEST(Reader, DegreesInLatin1AreDegrees) {
   ColumnMap map;
   add_column(map, "housing_degC=Gehäuse [°F]");
