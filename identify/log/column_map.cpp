@@ -114,13 +114,12 @@ void take_words(const Table& table, std::size_t column, Role role, std::vector<s
 }
 
 /// Where each comma of a column stands before three digits, and numbers below a thousand have none, it is no decimal
-/// comma: of decimals one in ten would end sooner.
+/// comma: of decimals one in ten would end sooner, or, where three of them are always written, 24,000 has one as well.
 void refuse_thousands(const Table& table, std::size_t column) {
   constexpr int least = 10;
   const std::vector<double>& cells = table.columns[column];
   const int commas = table.thousands[column];
-  const auto whole = std::count_if(cells.begin(), cells.end(), [](double x) { return x == std::round(x); });
-  if (commas >= least && static_cast<std::size_t>(whole) > 0 && largest_magnitude(cells) < 1000)
+  if (commas >= least && table.has_plain[column] && largest_magnitude(cells) < 1000)
     refuse_data(fmt::format("{}: the commas of column '{}' set thousands apart; export it without them.", table.file,
                             table.names[column]));
 }

@@ -312,6 +312,9 @@ TEST(Reader, CommasThatSetThousandsApartAreNoDecimalCommas) {
   std::string decimals = table("{:.3f}", 0.077);
   for (std::size_t at = 0; (at = decimals.find('.', at)) != std::string::npos;) decimals[at] = ',';
   EXPECT_NEAR(read(decimals)[0].of(Role::speed)[20], 1.54 * 0.104719755, 1e-9);
+  std::string three = "time_s;current_A;housing_degC\n";
+  for (int i = 0; i < 50; ++i) three += fmt::format("{};{};24,{:03}\n", i, i % 3, 20 * i);
+  EXPECT_EQ(read(three)[0].of(Role::housing)[1], 24.02);
 }
 
 TEST(Reader, QuotesInQuotesAndASignSetApartAreUnderstood) {
