@@ -140,6 +140,7 @@ Source give_clock(Table& table, const std::vector<Session>& sessions, double per
   table.words.emplace_back();
   table.of_day.push_back(false);
   table.thousands.push_back(0);
+  table.has_plain.push_back(true);
   return {table.names.back()};
 }
 

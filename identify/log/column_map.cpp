@@ -114,13 +114,12 @@ void take_words(const Table& table, std::size_t column, Role role, std::vector<s
 }
 
 /// Where each comma of a column stands before three digits, and numbers below a thousand have none, it is no decimal
-/// comma: of decimals one in ten would end sooner.
+/// comma: of decimals one in ten would end sooner, or, where three of them are always written, 24,000 has one as well.
 void refuse_thousands(const Table& table, std::size_t column) {
   constexpr int least = 10;
   const std::vector<double>& cells = table.columns[column];
   const int commas = table.thousands[column];
-  const auto whole = std::count_if(cells.begin(), cells.end(), [](double x) { return x == std::round(x); });
-  if (commas >= least && static_cast<std::size_t>(whole) > 0 && largest_magnitude(cells) < 1000)
+  if (commas >= least && table.has_plain[column] && largest_magnitude(cells) < 1000)
     refuse_data(fmt::format("{}: the commas of column '{}' set thousands apart; export it without them.", table.file,
                             table.names[column]));
 }
@@ -147,7 +146,9 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
 std::string unit_in_row(const Table& table, const std::string& column) {
   std::string unit = table.units.empty() ? "" : table.units[index_of(table, {column})];
   if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
-  return unit;
+  // How a date is written, "dd.MM.yyyy HH:mm:ss", or that it is one (TS, as Campbell's loggers say) is no unit.
+  const std::string low = in_small(unit);
+  return low == "ts" || low.find("yy") != low.npos || low.find("hh") != low.npos ? "" : unit;
 }
 
 /// Beside others in Fahrenheit a temperature without a unit is hardly in Celsius.

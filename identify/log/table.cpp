@@ -253,6 +253,7 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
   table.complaints.resize(header.size());
   table.of_day.resize(header.size());
   table.thousands.resize(header.size());
+  table.has_plain.resize(header.size());
   return !numbers;
 }
 
@@ -287,7 +288,8 @@ bool like_thousands(std::string_view cell) {
 
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    if (int& thousands = table.thousands[c]; thousands >= 0 && cells[c].find(',') != std::string_view::npos)
+    const bool comma = cells[c].find(',') != std::string_view::npos;
+    if (int& thousands = table.thousands[c]; thousands >= 0 && comma)
       thousands = like_thousands(cells[c]) ? thousands + 1 : -1;
     double value = missing, unused = 0;
     if (!number_of_column(table, c, cells[c], decimal_comma, value)) {
@@ -312,6 +314,7 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
                   : ""));
     }
     table.columns[c].push_back(value);
+    if (!comma && value == std::round(value)) table.has_plain[c] = true;
     if (time_of_day(cells[c], unused)) table.of_day[c] = true;
   }
   table.line.push_back(line);

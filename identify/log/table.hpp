@@ -50,6 +50,7 @@ struct Table {
   std::vector<std::string> complaints;       // for each column: what is wrong with its first cell that is no number
   std::vector<bool> of_day;                  // for each column: a cell of it is a time of day, without a date
   std::vector<int> thousands;                // for each column: cells such as 1,234; -1: others have a comma too
+  std::vector<bool> has_plain;               // for each column: a whole number in it has no comma
   std::vector<int> line;                     // line number of each row, for sentences
   std::vector<std::string> notes;            // what was passed over, a sentence each
 

@@ -161,6 +161,16 @@ TEST(Reader, ARowOfUnitsBelowTheHeaderIsObeyedUnlessTheColumnsUnitWasSaid) {
   says(complaint("time_s,current_A,housing_degC\ns,Arms,degC\n0,1,20\n"), "unknown unit 'Arms'");
 }
 
+TEST(Reader, HowADateIsWrittenIsNoUnit) {
+  for (const char* format : {"dd.MM.yyyy HH:mm:ss", "TS", "[hh:mm:ss]"}) {
+    const std::string text = std::string("time_s;current_A;housing_degC\n") + format +
+                             ";mA;degC\n21.11.2026 10:00:00;1000;20\n21.11.2026 10:00:01;2000;21\n";
+    const auto logs = read(text);
+    EXPECT_EQ(logs[0].of(Role::time), (std::vector<double>{0, 1})) << format;
+    EXPECT_EQ(logs[0].of(Role::current)[1], 2) << format;
+  }
+}
+
 TEST(Reader, DegreesInLatin1AreDegrees) {
   ColumnMap map;
   add_column(map, "housing_degC=Gehäuse [°F]");
@@ -302,6 +312,9 @@ TEST(Reader, CommasThatSetThousandsApartAreNoDecimalCommas) {
   std::string decimals = table("{:.3f}", 0.077);
   for (std::size_t at = 0; (at = decimals.find('.', at)) != std::string::npos;) decimals[at] = ',';
   EXPECT_NEAR(read(decimals)[0].of(Role::speed)[20], 1.54 * 0.104719755, 1e-9);
+  std::string three = "time_s;current_A;housing_degC\n";
+  for (int i = 0; i < 50; ++i) three += fmt::format("{};{};24,{:03}\n", i, i % 3, 20 * i);
+  EXPECT_EQ(read(three)[0].of(Role::housing)[1], 24.02);
 }
 
 TEST(Reader, QuotesInQuotesAndASignSetApartAreUnderstood) {
