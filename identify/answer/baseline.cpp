@@ -227,8 +227,7 @@ void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>
   if (far(lines[1], problem.belief.R2_K_per_W) && far(lines[3], problem.belief.C2_J_per_K) && R2 > 1 && C2 < 1)
     report.notes.push_back(
         fmt::format("R2 comes out {:.2g} times the sheet's and C2 {:.2g} times, as of a smaller motor, or of a current "
-                    "that is read "
-                    "{:.2g} times too small; see the current's unit, and whether {} is this motor.",
+                    "that is read {:.2g} times too small; see the current's unit, and whether {} is this motor.",
                     R2, C2, std::pow(R2 / C2, 0.25), problem.belief.motor));
 }
 
