@@ -197,8 +197,8 @@ struct Arguments {
   identify::Margins margins;
 };
 
-/// A row's logs, one after the other. Where few are drawn, each row draws its own: the same motors with the same causes in
-/// all rows would be bad luck four times over, and chance is counted for logs that do not know of each other.
+/// A row's logs, one after the other. Where few are drawn, each row draws its own: the same motors with the same causes
+/// in all rows would be bad luck four times over, and chance is counted for logs that do not know of each other.
 std::vector<tests::CaseOptions> cases_of(const Row& row, const Arguments& a) {
   const std::uint64_t first = a.first + (a.at_most > 0 ? 10'000 * static_cast<std::uint64_t>(&row - rows().data()) : 0);
   std::vector<tests::CaseOptions> out;
