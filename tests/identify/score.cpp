@@ -379,7 +379,8 @@ int main(int argc, char** argv) {
   });
   app.add_flag("--list", list, "the rows");
   app.add_option("--seeds", a.seeds, "logs for each hidden thing")->capture_default_str();
-  app.add_option("--at-most", a.at_most, "logs of a row that hides something, drawn by the first seed and other in each row");
+  app.add_option("--at-most", a.at_most,
+                 "logs of a row that hides something, drawn by the first seed and other in each row");
   app.add_option("--first", a.first, "first seed")->capture_default_str();
   app.add_option("--only", a.only, "one cause");
   app.add_option("--remove", a.remove, "take a cause out of the table");
