@@ -81,4 +81,9 @@ bool on_terminal() {
   return isatty(STDOUT_FILENO) == 1 && kind != nullptr && std::string(kind) != "dumb";
 }
 
+bool in_colours() {
+  const char* none = std::getenv("NO_COLOR");
+  return on_terminal() && (none == nullptr || *none == '\0');
+}
+
 }  // namespace console

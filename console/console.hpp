@@ -67,7 +67,9 @@ struct TerminalSize {
 };
 /// As it is; generous where nobody tells.
 TerminalSize terminal_size();
-/// Standard output is a terminal that understands colours and cursor movements.
+/// Standard output is a terminal that understands cursor movements.
 bool on_terminal();
+/// And its reader has not asked for none (NO_COLOR, see no-color.org).
+bool in_colours();
 
 }  // namespace console

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 namespace console {
 namespace {
@@ -68,35 +69,44 @@ std::string Live::table(const wire::State& state, double time_s) const {
   return text;
 }
 
+std::string Live::screen(const wire::State& state, double time_s, TerminalSize size, bool colours) {
+  std::string text = table(state, time_s);
+  const int axes = std::max(1, std::popcount(mask_));
+  // Two curves an axis, each with a line of labels, in what the table leaves of the screen.
+  const int left = (size.rows - fitted(text, size.columns, size.rows).rows - 1) / axes - 2;
+  const int heat_rows = std::clamp(left * 3 / 5, 2, 6), current_rows = std::clamp(left - heat_rows, 2, 4);
+  for (int a = 0; a < wire::axis_count; ++a) {
+    const wire::AxisReport& axis = state.axis[a];
+    Trail& trail = trails_[static_cast<std::size_t>(a)];
+    push(trail.core_degC, axis.core_degC);
+    push(trail.housing_degC, axis.housing_degC);
+    push(trail.iq_A, axis.iq_A);
+    push(trail.allowance_A, axis.allowance_A);
+    if ((mask_ >> a & 1) == 0) continue;
+    const std::string head = fmt::format("axis {} ", a);
+    text += plot({{head + label("core", axis.core_degC, "degC"), trail.core_degC},
+                  {label("housing", axis.housing_degC, "degC"), trail.housing_degC}},
+                 trail.heat, size.columns, heat_rows, colours);
+    text += plot({{head + label("iq", axis.iq_A, "A"), trail.iq_A},
+                  {label("allowance", axis.allowance_A, "A"), trail.allowance_A}},
+                 trail.current, size.columns, current_rows, colours);
+  }
+  return text;
+}
+
 void Live::show(const wire::State& state, double time_s) {
   if (time_s - drawn_s_ < (terminal_ ? 0.05 : 0.5)) return;
   drawn_s_ = time_s;
-  std::string text = table(state, time_s);
+  std::string text;
   if (terminal_) {
-    for (int a = 0; a < wire::axis_count; ++a) {
-      const wire::AxisReport& axis = state.axis[a];
-      Trail& trail = trails_[static_cast<std::size_t>(a)];
-      push(trail.core_degC, axis.core_degC);
-      push(trail.housing_degC, axis.housing_degC);
-      push(trail.iq_A, axis.iq_A);
-      push(trail.allowance_A, axis.allowance_A);
-      if ((mask_ >> a & 1) == 0) continue;
-      const std::string head = fmt::format("axis {} ", a);
-      text += plot({{head + label("core", axis.core_degC, "degC"), trail.core_degC},
-                    {label("housing", axis.housing_degC, "degC"), trail.housing_degC}},
-                   trail.heat, terminal_width(), 6, true);
-      text += plot({{head + label("iq", axis.iq_A, "A"), trail.iq_A},
-                    {label("allowance", axis.allowance_A, "A"), trail.allowance_A}},
-                   trail.current, terminal_width(), 4, true);
-    }
-    // Up over what was drawn last, then each line over the old one; \033[K clears what the old one had more.
-    std::string drawn = lines_ > 0 ? fmt::format("\033[{}A", lines_) : "";
     const TerminalSize size = terminal_size();
-    const Fitted shown = fitted(text, size.columns, size.rows);
-    for (const char c : shown.text) drawn += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
+    // Up over what was drawn last, then each line over the old one; \033[K clears what the old one had more.
+    if (lines_ > 0) text = fmt::format("\033[{}A", lines_);
+    const Fitted shown = fitted(screen(state, time_s, size, in_colours()), size.columns, size.rows);
+    for (const char c : shown.text) text += c == '\n' ? std::string("\033[K\n") : std::string(1, c);
     lines_ = shown.rows;
-    text = drawn;
   } else {
+    text = table(state, time_s);
     lines_ = 1;  // the header stands
   }
   fmt::print("{}", text);

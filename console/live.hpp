@@ -21,6 +21,8 @@ class Live {
   explicit Live(std::uint8_t mask);
   /// Redraws at most 20 times a second of `time_s`; elsewhere a row at most twice a second.
   void show(const wire::State& state, double time_s);
+  /// A row more of each curve and what a terminal of that size then shows; only a very low one cuts it.
+  std::string screen(const wire::State& state, double time_s, TerminalSize size, bool colours);
 
  private:
   struct Trail {

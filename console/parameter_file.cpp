@@ -45,19 +45,21 @@ std::string parameter_file(const Session& session, const std::vector<Target>& ta
   return text;
 }
 
-std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary) {
+ParameterFile read_parameter_file(const std::string& path, const Dictionary& dictionary) {
   if (!std::filesystem::is_regular_file(path))
     refuse(path + ": there is no such file; check the path, or write one with 'hotcore backup'.");
   const toml::table file = wire::pc::parse_toml(path);
-  std::vector<Assignment> assignments;
+  const auto name = file["board"]["name"].value<std::string>(), serial = file["board"]["serial"].value<std::string>();
+  ParameterFile read{name && serial ? *name + " " + *serial : "", {}};
+  std::vector<Assignment>& assignments = read.assignments;
   for (const auto& [section_key, section] : file) {
-    const std::string name(section_key.str());
-    if (name == "board") continue;
+    const std::string title(section_key.str());
+    if (title == "board") continue;
     if (!section.is_table()) {
-      refuse(fmt::format("{}: '{}' stands outside [axis0], [axis1] and [common]; move it there.", path, name));
+      refuse(fmt::format("{}: '{}' stands outside [axis0], [axis1] and [common]; move it there.", path, title));
     }
     for (const auto& [key, node] : *section.as_table()) {
-      const std::string full = name == common ? std::string(key.str()) : name + "." + std::string(key.str());
+      const std::string full = title == common ? std::string(key.str()) : title + "." + std::string(key.str());
       const auto value = node.value<double>();
       if (!value) refuse(fmt::format("{}: {} is no number; repair it.", path, full));
       for (const Target& target : dictionary.named(full, path)) {
@@ -68,7 +70,7 @@ std::vector<Assignment> read_parameter_file(const std::string& path, const Dicti
   }
   check_each_once(assignments, path + ": ");
   if (assignments.empty()) refuse(path + ": no parameter in it; 'hotcore backup FILE' writes such a file.");
-  return assignments;
+  return read;
 }
 
 void check(const Assignment& assignment, const std::string& where) {

@@ -14,9 +14,14 @@ namespace console {
 std::string parameter_file(const Session& session, const std::vector<Target>& targets,
                            const std::vector<float>& values);
 
+struct ParameterFile {
+  std::string board;  // "h8-15d 3A00C5": whose it says it is; empty where [board] does not say
+  std::vector<Assignment> assignments;
+};
+
 /// What a file assigns, checked against what the board declares: a name that it does not have, a value outside its
 /// range or no number is refused with the file, the name and what would be right (UserError, usage). Nothing is sent.
-std::vector<Assignment> read_parameter_file(const std::string& path, const Dictionary& dictionary);
+ParameterFile read_parameter_file(const std::string& path, const Dictionary& dictionary);
 
 /// Throws UserError (usage) unless the value fits the range that the board declares.
 void check(const Assignment& assignment, const std::string& where);

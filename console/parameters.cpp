@@ -67,8 +67,8 @@ void parse(const std::string& text, const Dictionary& dictionary, std::vector<As
   }
 }
 
-/// Puts a change in force and says what it changed.
-void apply(Console& console, const std::vector<Assignment>& assignments, bool save) {
+/// Puts a change in force and says what it changed, after `note`.
+void apply(Console& console, const std::vector<Assignment>& assignments, bool save, const std::string& note = "") {
   Session& session = console.session();
   std::vector<Target> targets;
   for (const Assignment& assignment : assignments) targets.push_back(assignment.target);
@@ -85,7 +85,9 @@ void apply(Console& console, const std::vector<Assignment>& assignments, bool sa
   if (text.empty()) text = "Nothing changed: the board had these values already.\n";
   if (save) session.save();
   text += save ? "Saved.\n" : "In force until the next reset; 'hotcore save' keeps it.\n";
-  console.say(text, {{"changed", changes}, {"saved", save}});
+  Json json = {{"changed", changes}, {"saved", save}};
+  if (!note.empty()) json["note"] = note;
+  console.say(note + (note.empty() ? "" : "\n") + text, json);
 }
 
 void set(Console& console, const std::vector<std::string>& texts, bool save) {
@@ -106,7 +108,8 @@ void diff(Console& console, const std::string& path) {
   std::vector<bool> compared(held.targets.size(), path.empty());
   for (std::size_t i = 0; i < held.targets.size() && path.empty(); ++i) other[i] = held.targets[i].what->fallback;
   if (!path.empty()) {
-    for (const Assignment& a : read_parameter_file(path, console.session().parameters())) {
+    const ParameterFile file = read_parameter_file(path, console.session().parameters());
+    for (const Assignment& a : file.assignments) {
       for (std::size_t i = 0; i < held.targets.size(); ++i) {
         if (held.targets[i].what != a.target.what || held.targets[i].axis != a.target.axis) continue;
         other[i] = a.value;
@@ -122,7 +125,8 @@ void diff(Console& console, const std::string& path) {
     if (same && compared[i]) continue;
     const std::string there = !compared[i] ? "not in the file" : shown(other[i]);
     text += fmt::format("{:<32} {:>11}   {}\n", full_name(held.targets[i]), shown(held.values[i]), there);
-    json[full_name(held.targets[i])] = {{"board", number(held.values[i])}, {"other", number(other[i])}};
+    Json& entry = json[full_name(held.targets[i])] = {{"board", number(held.values[i])}};
+    if (compared[i]) entry["other"] = number(other[i]);  // null is unset; what the file does not have has no "other"
   }
   text = text.empty() ? fmt::format("No difference to {}.\n", path.empty() ? "the defaults" : path)
                       : fmt::format("{:<32} {:>11}   {}\n", "", "board", against) + text;
@@ -138,7 +142,15 @@ void backup(Console& console, const std::string& path, bool force) {
 }
 
 void restore(Console& console, const std::string& path, bool save) {
-  apply(console, read_parameter_file(path, console.session().parameters()), save);
+  const ParameterFile file = read_parameter_file(path, console.session().parameters());
+  const std::string& here = console.session().name();
+  // Allowed, since boards are replaced and copied.
+  const std::string note =
+      file.board.empty() || file.board == here
+          ? ""
+          : fmt::format("{} is of {}, this is {}: if other motors hang on it, set their motor and angle_offset_rad.",
+                        path, file.board, here);
+  apply(console, file.assignments, save, note);
 }
 
 }  // namespace

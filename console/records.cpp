@@ -107,7 +107,7 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
       console.say("", json);
       continue;
     }
-    std::string text = curves.drawn(terminal_width(), 8, on_terminal());
+    std::string text = curves.drawn(terminal_width(), 8, in_colours());
     if (on_terminal()) {
       if (lines > 0) fmt::print("\033[{}A\033[J", lines);
       const TerminalSize size = terminal_size();
@@ -236,7 +236,7 @@ void capture(Console& console, const CaptureArguments& a) {
   for (std::size_t s = 0; s < lines.size(); ++s) {
     lines[s].label = columns[s];
     Scale scale{signals[s].what->unit, least_span};
-    text += plot({lines[s]}, scale, terminal_width(), 6, on_terminal());
+    text += plot({lines[s]}, scale, terminal_width(), 6, in_colours());
   }
   text += fmt::format("Written: {} ({} rows, {} of them before the trigger; the picture shows the last ones).\n",
                       a.path, status.rows, status.pre);

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "console/commands.hpp"
+#include "console/live.hpp"
 #include "console/plot.hpp"
 #include "console/profile.hpp"
 #include "console/recorder.hpp"
@@ -70,7 +71,6 @@ class Commands : public testing::Test {
 };
 
 // ---- what is right
-// ----------------------------------------------------------------------------------------------------
 
 TEST_F(Commands, GetShowsValueRangeAndMeaning) {
   const Said said = say("get axis1.current_limit_A");
@@ -106,6 +106,35 @@ TEST_F(Commands, BackupThenRestoreBringsEachBitBack) {
   EXPECT_EQ(json("diff " + path("mine.toml"))["differences"].size(), 4u);
   EXPECT_EQ(say("restore " + path("mine.toml")).code, 0);
   EXPECT_EQ(board_->in_force, before);
+}
+
+TEST_F(Commands, BothAxesAreWatchedOnTheSmallestUsualTerminal) {
+  const console::TerminalSize size{80, 24};
+  console::Live live(3);
+  const std::string text = live.screen({}, 0, size, false);
+  EXPECT_EQ(console::fitted(text, size.columns, size.rows).text, text) << text;
+  EXPECT_NE(text.find("axis 1 iq"), std::string::npos) << text;
+  EXPECT_EQ(text.find('\033'), std::string::npos);
+}
+
+TEST_F(Commands, RestoreSaysWhereTheFileIsAnotherBoards) {
+  EXPECT_EQ(say("backup " + path("mine.toml")).code, 0);
+  EXPECT_FALSE(json("restore " + path("mine.toml")).contains("note"));
+  std::string other = content(path("mine.toml"));
+  const std::string serial = "serial = \"";
+  other.insert(other.find(serial) + serial.size(), "X");
+  std::ofstream(path("other.toml")) << other;
+  EXPECT_NE(json("restore " + path("other.toml"))["note"].get<std::string>().find("angle_offset_rad"),
+            std::string::npos);
+  EXPECT_NE(say("restore " + path("other.toml")).out.find("other.toml is of "), std::string::npos);
+}
+
+TEST_F(Commands, DiffTellsUnsetFromWhatTheFileDoesNotHave) {
+  std::ofstream(path("p.toml")) << "[axis0]\nphase_resistance_ohm = nan\n";
+  const auto differences = json("diff " + path("p.toml"))["differences"];
+  EXPECT_TRUE(differences["axis0.phase_resistance_ohm"]["other"].is_null());
+  EXPECT_TRUE(differences["axis0.phase_resistance_ohm"].contains("other"));
+  EXPECT_FALSE(differences["axis0.current_limit_A"].contains("other"));
 }
 
 TEST_F(Commands, WhatStandsInCommonIsOfBothAxes) {
