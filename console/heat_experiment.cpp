@@ -120,8 +120,10 @@ Values parameters_of_model(const std::string& path, std::string& why) {
     if (drive != "current_A2" || source["node"].value_or(0) != 0) return why = "heat that goes with " + drive, Values{};
     if (const auto k = source["coefficient_per_K"].value<double>()) put("copper_coefficient_per_K", *k);
   }
-  put("housing_lag_s", file.at_path("housing_sensor.lag_s").value_or(0.0));
-  put("housing_offset_K", file.at_path("housing_sensor.offset_K").value_or(0.0));
+  // A model with none has found none, which is no reason to forget what the board was told.
+  for (const auto& [name, key] : {std::pair{"housing_lag_s", "lag_s"}, {"housing_offset_K", "offset_K"}}) {
+    if (const double value = file["housing_sensor"][key].value_or(0.0); value != 0) put(name, value);
+  }
   if (file.at_path("housing_sensor.gain_error").value_or(0.0) != 0) return why = "a sensor gain that is off", Values{};
   for (const auto& [name, value] : found) {
     if (!std::isfinite(value)) return why = "no finite " + name, Values{};

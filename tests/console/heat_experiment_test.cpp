@@ -118,11 +118,7 @@ nlohmann::json answer(double miss_K, bool determined) {
 
 TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
   const auto offered = console::offer(answer(0.1, true), file("model.toml", two_resistors), believed(), true);
-  const console::Values expected = {{"C2_J_per_K", 20.0f},
-                                    {"R2_K_per_W", 10.0f},
-                                    {"copper_coefficient_per_K", 0.004f},
-                                    {"housing_lag_s", 0.0f},
-                                    {"housing_offset_K", 0.0f}};
+  const console::Values expected = {{"C2_J_per_K", 20.0f}, {"R2_K_per_W", 10.0f}, {"copper_coefficient_per_K", 0.004f}};
   EXPECT_EQ(offered.values, expected);
 }
 
@@ -134,19 +130,26 @@ TEST(HeatExperiment, OfALogThatCannotTellNothingIsOffered) {
   EXPECT_NE(offered.note.find("cannot tell"), std::string::npos) << offered.note;
 }
 
+TEST(HeatExperiment, WhatWasToldOfTheSensorAndNotFoundStays) {
+  const std::string none = file("model.toml", two_resistors + "[housing_sensor]\nlag_s = 0\noffset_K = 0\n");
+  const auto offered = console::offer(answer(0.1, true), none, believed(), true).values;
+  EXPECT_FALSE(offered.contains("housing_lag_s") || offered.contains("housing_offset_K"));
+}
+
 /// A log that begins above its room makes R2 too small and C2 too large, and says nothing of an offset.
 TEST(HeatExperiment, NothingCoolerIsOfferedUnlessTheRoomIsTold) {
   console::Values before = believed();
   before["housing_offset_K"] = -2.0f;
-  const std::string cooler = file("model.toml", two_resistors);  // R2 10 K/W, C2 20 J/K, no offset
-  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, true).values.size(), 5u);
+  const std::string cooler =  // R2 10 K/W, C2 20 J/K
+      file("model.toml", two_resistors + "[housing_sensor]\noffset_K = -1\n");
+  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, true).values.size(), 4u);
   const auto offered = console::offer(answer(0.1, true), cooler, before, false);
-  const console::Values left = {{"copper_coefficient_per_K", 0.004f}, {"housing_lag_s", 0.0f}};
+  const console::Values left = {{"copper_coefficient_per_K", 0.004f}};
   EXPECT_EQ(offered.values, left);
-  EXPECT_NE(offered.note.find("(--ambient DEGC): R2_K_per_W 10, C2_J_per_K 20, housing_offset_K 0"), std::string::npos)
+  EXPECT_NE(offered.note.find("(--ambient DEGC): R2_K_per_W 10, C2_J_per_K 20, housing_offset_K -1"), std::string::npos)
       << offered.note;
   before["R2_K_per_W"] = 9.0f, before["C2_J_per_K"] = 21.0f, before["housing_offset_K"] = 0.0f;
-  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, false).values.size(), 5u);
+  EXPECT_EQ(console::offer(answer(0.1, true), cooler, before, false).values.size(), 4u);
 }
 
 TEST(HeatExperiment, BeyondTheBoardsModelOnlyASmallMissIsForgiven) {
