@@ -291,6 +291,20 @@ TEST_F(Running, EveryTripOpensTheBridgeAtOnceAndKeepsItsEvidence) {
   EXPECT_EQ(axis().fault().fault, Fault::over_current);
 }
 
+TEST_F(Running, EachFaultHasAnAgeOfItsOwn) {
+  spoilt([](auto& s) { s.current_A.b = -28.5f; });
+  run(2000);
+  ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+  ASSERT_EQ(axis().clear(), Status::done);
+  run(1);
+  ASSERT_EQ(axis().arm(), Status::done);
+  run(1);
+  spoilt([](auto& s) { s.current_A.b = -28.5f; });
+  ASSERT_EQ(axis().mode(), Mode::tripped);
+  run(20);
+  EXPECT_NEAR(axis().fault().age_s, 0.001f, 1e-4f);
+}
+
 TEST_F(Running, NothingMovesAfterAFaultWithoutAClearAndAZeroSetpoint) {
   spoilt([](auto& s) { s.bus_V = 60.0f; });
   hold({0.0f, 5.0f}, 400);

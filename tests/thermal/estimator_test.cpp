@@ -750,6 +750,17 @@ TEST(Estimator, WindingResistanceCorrectsAndAnImplausibleOneIsRefused) {
   }
 }
 
+TEST(Estimator, ConstantHeatCountsThoughNobodyReportsIt) {
+  const wire::Motor m = reference::ec16();
+  auto set = thermal::three_phase_set(m);
+  const double W = 0.5;
+  set.sources[set.source_count++] = {set.housing.node, Drive::one, W, 0.0};
+  CoreEstimator core(set, with(thermal::exact_trust));
+  const int ten_times_tau = static_cast<int>(10 * m.R2_K_per_W * m.C2_J_per_K / thermal::estimator_dt_s);
+  for (int i = 0; i < ten_times_tau; ++i) core.tick({}, missing, {30.0f, true});
+  EXPECT_NEAR(core.estimate().housing_degC, 30.0 + W * m.R2_K_per_W, 0.01);
+}
+
 TEST(Estimator, WithoutAnySensorTheAmbientIsBelievedHot) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   for (int i = 0; i < 100000; ++i) core.tick({}, missing);
