@@ -17,7 +17,13 @@ namespace {
 
 using thermal::Drive;
 
+/// Rows without a clock have the period that somebody said.
+bool by_row(const Log& log) { return log.called[static_cast<std::size_t>(Role::time)] == "--period"; }
+
 std::string in_milliseconds(const Log& log) {
+  if (by_row(log))
+    return "At this period of its rows the motor hardly follows the load, and a thousandth of it "
+           "explains more; say the right --period, in seconds.";
   return fmt::format(
       "Read in milliseconds, or less, the time column makes a motor that follows the load, and in seconds none; say "
       "{}, or :us.",
@@ -69,6 +75,7 @@ double winding_of_housing(const Found& found) {
 constexpr double fastest_housing_s = 20;
 
 std::string in_minutes(const Log& log) {
+  if (by_row(log)) return "see whether --period tells the seconds from row to row";
   return fmt::format("if the time column is in minutes say {}, if in hours or days :h or :d",
                      column_in(log, Role::time, "min"));
 }
