@@ -216,8 +216,9 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
 }
 
 /// The same logs with the load so many seconds later, or sooner where that is negative, without the rows that then have
-/// none or nothing else. None where that would leave less than three quarters of a log, or a pause stands in it.
-std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs) {
+/// none or nothing else; `moves` false: those readings with the load as it was. None where that would leave less than
+/// three quarters of a log, or a pause stands in it.
+std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs, bool moves = true) {
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto rows = static_cast<std::ptrdiff_t>(std::abs(late_s) / problem.logs[l].interval_s);
     if (4 * rows > std::ssize(logs[l].of(Role::time)) || !logs[l].resumes_s.empty()) return {};
@@ -227,7 +228,7 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
       const bool load =
           std::find(std::begin(load_roles), std::end(load_roles), static_cast<Role>(role)) != std::end(load_roles);
       // Time goes on from zero either way.
-      if (static_cast<Role>(role) == Role::time || load == (late_s > 0))
+      if (static_cast<Role>(role) == Role::time || (load && moves) == (late_s > 0))
         column.erase(column.end() - rows, column.end());
       else
         column.erase(column.begin(), column.begin() + rows);
@@ -241,7 +242,7 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 double clocks_apart_s(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  double late_s = 0, least = fraction_left * excess(found.plain_baseline);
+  double late_s = 0, apart_s = 0, least = fraction_left * excess(found.plain_baseline);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
   const double in_a_look = left_in_a_look(problem, found);
@@ -257,9 +258,13 @@ double clocks_apart_s(const Problem& problem, const Found& found, const std::vec
   for (std::size_t i = 0; i < std::size(tried_s); ++i) {
     if (!fits[i].valid() || excess(fits[i]) >= least) continue;
     least = excess(fits[i]);
-    late_s = tried_s[i] + fits[i].x[coordinate_of(fits[i], Edit::delay)];
+    apart_s = tried_s[i];
+    late_s = apart_s + fits[i].x[coordinate_of(fits[i], Edit::delay)];
   }
-  return late_s;
+  if (late_s == 0) return 0;
+  // What no model followed may have gone with the rows that were taken away: one step of the load near an end.
+  const Problem as_it_was = unseen_by(problem, loaded_later(apart_s, problem, logs, false));
+  return least < fraction_left * excess(fit(as_it_was, {})) ? late_s : 0;
 }
 
 /// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?

@@ -219,6 +219,20 @@ TEST(SlowBadInput, ACurrentThatIsReadTooSmall) {
        "a current that is read 2.7 times too small; see the current's unit");
 }
 
+TEST(BadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
+  const auto no_core = [](auto& row, int i) {
+    if (i > 0) row[5] = "";
+    return true;
+  };
+  tests::BenchOptions controller, flange;
+  controller.motor.R1 = 0.5, controller.motor.R2 = 1.3, controller.motor.C2 = 60;
+  flange.motor.R2 = 16.3 / 5, flange.motor.C2 = 60;
+  const std::string asked = "less than a flange leaves of it: see whether the sensor sits on the motor";
+  says(run(spoilt(no_core, controller) + " --motor ec-16-40w").out, asked);
+  const Outcome cooled = run(spoilt(no_core, flange) + " --motor ec-16-40w");
+  EXPECT_EQ(cooled.out.find(asked), std::string::npos) << cooled.out;
+}
+
 TEST(BadInput, APauseInWhichTheMotorRanOn) {
   const auto paused = [](auto&, int row) { return row < 4000 || row > 4600; };
   const Outcome r = run(spoilt(paused) + " --motor ec-16-40w");
