@@ -264,7 +264,8 @@ double clocks_apart_s(const Problem& problem, const Found& found, const std::vec
   if (late_s == 0) return 0;
   // What no model followed may have gone with the rows that were taken away: one step of the load near an end.
   const Problem as_it_was = unseen_by(problem, loaded_later(apart_s, problem, logs, false));
-  return least < fraction_left * excess(fit(as_it_was, {})) ? late_s : 0;
+  const double in_place = std::min(excess(fit(as_it_was, {})), excess(fit(as_it_was, {clock})));
+  return least + clearly < in_place && least < fraction_left * in_place ? late_s : 0;
 }
 
 /// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?

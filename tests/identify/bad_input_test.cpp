@@ -219,6 +219,27 @@ TEST(SlowBadInput, ACurrentThatIsReadTooSmall) {
        "a current that is read 2.7 times too small; see the current's unit");
 }
 
+TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
+  // The load that a later clock would have moved away with the readings that it had moved.
+  tests::BenchOptions warm;
+  warm.seconds = 2600, warm.rate_Hz = 0.5;
+  warm.core_every_s = 2, warm.core_white_K = 0.1;
+  warm.white_K = 0.05, warm.step_K = 0.01;
+  warm.current_A = [](double t, std::mt19937_64&) { return t < 1500 ? 3 : 1.4; };
+  warm.extra_housing_W = [](double, double, double housing_degC) {
+    const double rise_K = housing_degC - 24;
+    return -rise_K / 16.3 * 0.3 * rise_K / 20;
+  };
+  std::vector<identify::Log> logs = tests::bench_logs({warm});
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + 740);
+  }
+  for (double& t : logs[0].of(identify::Role::time)) t -= 1480;
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.sentence.find("two clocks; align"), std::string::npos) << report.sentence;
+  says(report.sentence, "natural_convection");
+}
+
 TEST(BadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
   const auto no_core = [](auto& row, int i) {
     if (i > 0) row[5] = "";
