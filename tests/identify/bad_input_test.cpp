@@ -240,6 +240,29 @@ TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
   says(report.sentence, "natural_convection");
 }
 
+TEST(BadInput, HowFarAWindingMovesBetweenTheRowsOfATableIsNoNoise) {
+  // Ten minutes on and ten off, read every five: neighbouring readings are 17 K apart.
+  const auto discovered = [](double to_mass_K_per_W) {
+    tests::BenchOptions table;
+    table.motor = {.ohm = 1.5, .R1 = 0.08, .R2 = 0.12, .C1 = 4000, .C2 = 20000};
+    table.seconds = 14400, table.rate_Hz = 1.0 / 300;
+    table.core_every_s = 300, table.core_white_K = 0.3;
+    table.white_K = 0.3;
+    table.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 1200) < 600 ? 22 : 0; };
+    double mass_degC = table.ambient_degC;
+    table.extra_housing_W = [&](double, double, double housing_degC) {
+      const double to_mass_W = (housing_degC - mass_degC) / to_mass_K_per_W;
+      mass_degC += 0.005 * to_mass_W / 30000;  // four times in a step of 20 ms
+      return -to_mass_W;
+    };
+    return identify::discover(tests::bench_logs({table}), std::nullopt);
+  };
+  const identify::Report clean = discovered(1e9), wrong = discovered(0.3);
+  EXPECT_EQ(clean.verdict, identify::Verdict::adequate) << clean.sentence;
+  says(clean.sentence, "noisy by 0.");
+  EXPECT_NE(wrong.verdict, identify::Verdict::adequate) << wrong.sentence;
+}
+
 TEST(BadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
   const auto no_core = [](auto& row, int i) {
     if (i > 0) row[5] = "";
