@@ -371,9 +371,15 @@ std::string too_short(const Problem& problem, const Found& found) {
                        problem.logs.size() > 1 ? "Together they last" : "It lasts", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
+  constexpr double settled = 3;  // time constants: 95 percent of the way
   const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };
   if ((found.verdict == Verdict::adequate && !settles(plain)) || (explains && !settles(found.chosen.fit)))
-    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
+    return explains && settles(plain) && lasts_s > settled * housing_s
+               ? fmt::format(
+                     "Beside {} this log leaves open how well the housing is cooled; hold loads of several "
+                     "sizes, each until the temperatures stand.",
+                     fmt::join(names_of(found.chosen.fit.chosen), " and "))
+               : fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
   if (never_changes(problem))
     return "The load never changes, so heat and cooling cannot be told apart; record rests between loads of several "
            "sizes.";

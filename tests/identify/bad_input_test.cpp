@@ -109,6 +109,26 @@ TEST(SlowBadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
   says(r.out, "does not come near where it settles");
 }
 
+TEST(BadInput, AHousingThatSettledIsNotSaidToHaveNotWhereItsCoolingIsOpen) {
+  // Five hours of forty minutes, in whole degrees: convection and radiation share what grows with the rise.
+  tests::BenchOptions hours;
+  hours.motor = {.ohm = 1.5, .R1 = 0.08, .R2 = 0.12, .C1 = 4000, .C2 = 20000};
+  hours.seconds = 18000, hours.rate_Hz = 1.0 / 60;
+  hours.core_white_K = 0.3, hours.white_K = 0.3, hours.step_K = 1;
+  hours.current_A = [](double t, std::mt19937_64&) { return t < 10800 ? 18 : 0; };
+  hours.extra_housing_W = [](double, double, double housing_degC) {
+    const double rise_K = housing_degC - 24;
+    return -rise_K / 0.12 * 0.2 * rise_K / 20;
+  };
+  const auto in_degrees = [](auto& row, int) {
+    row[5] = fmt::format("{:.0f}", std::stod(row[5]));
+    return true;
+  };
+  const Outcome r = run(spoilt(in_degrees, hours));
+  EXPECT_EQ(r.out.find("where it settles"), std::string::npos) << r.out;
+  says(r.out, "this log leaves open how well the housing is cooled");
+}
+
 TEST(BadInput, NothingThatVaries) {
   refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "same in all rows");
 }
