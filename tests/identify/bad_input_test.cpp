@@ -260,6 +260,27 @@ TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
   says(report.sentence, "natural_convection");
 }
 
+TEST(BadInput, AMassThatIsStillColdWhereALogBeginsSoonAfterItsMotorIsNoSecondCause) {
+  // A frame that takes minutes has hardly warmed while the housing rose by 20 K: behind by nearly all of it.
+  tests::BenchOptions soon;
+  soon.seconds = 960, soon.rate_Hz = 2;
+  soon.core_every_s = 0.5, soon.core_white_K = 0.1;
+  soon.white_K = 0.05, soon.step_K = 0.01;
+  soon.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 150) < 75 ? 4 : 0; };
+  double mass_degC = soon.ambient_degC;
+  soon.extra_housing_W = [&](double, double, double housing_degC) {
+    const double to_mass_W = (housing_degC - mass_degC) / 10;
+    mass_degC += 0.005 * to_mass_W / 14;  // four times in a step of 20 ms
+    return -to_mass_W;
+  };
+  std::vector<identify::Log> logs = tests::bench_logs({soon});
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + 120);
+  }
+  for (double& t : logs[0].of(identify::Role::time)) t -= 60;
+  says(identify::discover(logs, std::nullopt).sentence, "The motor behaves like third_mass:");
+}
+
 TEST(BadInput, HowFarAWindingMovesBetweenTheRowsOfATableIsNoNoise) {
   // Ten minutes on and ten off, read every five: neighbouring readings are 17 K apart.
   const auto discovered = [](double to_mass_K_per_W) {
