@@ -121,6 +121,7 @@ int answer(Arguments a) {
   for (const std::string& column : a.columns) identify::add_column(said, column);
   for (const auto& [role, source] : said.columns) map.columns[role] = source;
   map.rows = a.rows;
+  map.folder = HOTCORE_MAP_FOLDER;
   if (a.period_s) map.period_s = *a.period_s;
   if (a.ambient_degC) map.ambient_degC = *a.ambient_degC;
   if (!a.truths.empty()) {

@@ -229,6 +229,13 @@ void compare_with_sheet(const Problem& problem, const std::vector<ParameterLine>
         fmt::format("R2 comes out {:.2g} times the sheet's and C2 {:.2g} times, as of a smaller motor, or of a current "
                     "that is read {:.2g} times too small; see the current's unit, and whether {} is this motor.",
                     R2, C2, std::pow(R2 / C2, 0.25), problem.belief.motor));
+  // A large flange takes four fifths of it away (a maker's word, recalled), and the sheet may be off as R1's are.
+  constexpr double coolest = 1 / (5 * 1.8);
+  if (far(lines[1], problem.belief.R2_K_per_W) && R2 < coolest)
+    report.notes.push_back(fmt::format(
+        "R2 comes out {:.2g} times the sheet's, less than a flange leaves of it: see whether the sensor sits "
+        "on the motor, and not on its controller or on what cools it.",
+        R2));
 }
 
 }  // namespace identify

@@ -17,7 +17,13 @@ namespace {
 
 using thermal::Drive;
 
+/// Rows without a clock have the period that somebody said.
+bool by_row(const Log& log) { return log.called[static_cast<std::size_t>(Role::time)] == "--period"; }
+
 std::string in_milliseconds(const Log& log) {
+  if (by_row(log))
+    return "At this period of its rows the motor hardly follows the load, and a thousandth of it "
+           "explains more; say the right --period, in seconds.";
   return fmt::format(
       "Read in milliseconds, or less, the time column makes a motor that follows the load, and in seconds none; say "
       "{}, or :us.",
@@ -69,6 +75,7 @@ double winding_of_housing(const Found& found) {
 constexpr double fastest_housing_s = 20;
 
 std::string in_minutes(const Log& log) {
+  if (by_row(log)) return "see whether --period tells the seconds from row to row";
   return fmt::format("if the time column is in minutes say {}, if in hours or days :h or :d",
                      column_in(log, Role::time, "min"));
 }
@@ -209,8 +216,9 @@ std::string misread_columns(const Problem& problem, const Found& found, const st
 }
 
 /// The same logs with the load so many seconds later, or sooner where that is negative, without the rows that then have
-/// none or nothing else. None where that would leave less than three quarters of a log, or a pause stands in it.
-std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs) {
+/// none or nothing else; `moves` false: those readings with the load as it was. None where that would leave less than
+/// three quarters of a log, or a pause stands in it.
+std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector<Log> logs, bool moves = true) {
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto rows = static_cast<std::ptrdiff_t>(std::abs(late_s) / problem.logs[l].interval_s);
     if (4 * rows > std::ssize(logs[l].of(Role::time)) || !logs[l].resumes_s.empty()) return {};
@@ -220,7 +228,7 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
       const bool load =
           std::find(std::begin(load_roles), std::end(load_roles), static_cast<Role>(role)) != std::end(load_roles);
       // Time goes on from zero either way.
-      if (static_cast<Role>(role) == Role::time || load == (late_s > 0))
+      if (static_cast<Role>(role) == Role::time || (load && moves) == (late_s > 0))
         column.erase(column.end() - rows, column.end());
       else
         column.erase(column.begin(), column.begin() + rows);
@@ -234,7 +242,7 @@ std::vector<Log> loaded_later(double late_s, const Problem& problem, std::vector
 double clocks_apart_s(const Problem& problem, const Found& found, const std::vector<Log>& logs) {
   const Chosen clock = {cause_named("clock_delay"), -1};
   const double reach_s = cause_of(clock).parameters[0].high;
-  double late_s = 0, least = fraction_left * excess(found.plain_baseline);
+  double late_s = 0, apart_s = 0, least = fraction_left * excess(found.plain_baseline);
   for (const Fit* f : {&found.singles.front().fit, &found.chosen.fit})
     least = std::min(least, excess(fit(problem, f->chosen, {f})) - clearly);
   const double in_a_look = left_in_a_look(problem, found);
@@ -250,9 +258,14 @@ double clocks_apart_s(const Problem& problem, const Found& found, const std::vec
   for (std::size_t i = 0; i < std::size(tried_s); ++i) {
     if (!fits[i].valid() || excess(fits[i]) >= least) continue;
     least = excess(fits[i]);
-    late_s = tried_s[i] + fits[i].x[coordinate_of(fits[i], Edit::delay)];
+    apart_s = tried_s[i];
+    late_s = apart_s + fits[i].x[coordinate_of(fits[i], Edit::delay)];
   }
-  return late_s;
+  if (late_s == 0) return 0;
+  // What no model followed may have gone with the rows that were taken away: one step of the load near an end.
+  const Problem as_it_was = unseen_by(problem, loaded_later(apart_s, problem, logs, false));
+  const double in_place = std::min(excess(fit(as_it_was, {})), excess(fit(as_it_was, {clock})));
+  return least + clearly < in_place && least < fraction_left * in_place ? late_s : 0;
 }
 
 /// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?
@@ -358,9 +371,15 @@ std::string too_short(const Problem& problem, const Found& found) {
                        problem.logs.size() > 1 ? "Together they last" : "It lasts", lasts_s,
                        known ? fmt::format(" of about {:.0f} s", housing_s) : ", which it does not determine");
   }
+  constexpr double settled = 3;  // time constants: 95 percent of the way
   const auto settles = [&](const Fit& f) { return problem.belief.known || base_lines(problem, f, 1)[1].determined; };
   if ((found.verdict == Verdict::adequate && !settles(plain)) || (explains && !settles(found.chosen.fit)))
-    return fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
+    return explains && settles(plain) && lasts_s > settled * housing_s
+               ? fmt::format(
+                     "Beside {} this log leaves open how well the housing is cooled; hold loads of several "
+                     "sizes, each until the temperatures stand.",
+                     fmt::join(names_of(found.chosen.fit.chosen), " and "))
+               : fmt::format("In {:.0f} s the housing does not come near where it settles; record longer.", lasts_s);
   if (never_changes(problem))
     return "The load never changes, so heat and cooling cannot be told apart; record rests between loads of several "
            "sizes.";

@@ -17,7 +17,7 @@ constexpr double warm_excess_share = 0.5;
 // none, evenly likely, the root of whose mean square this is; three times it under a burst. And an ambient may have
 // drifted for as long again.
 const double before_sd = 1 / std::sqrt(3.0);
-constexpr double least_before[] = {-1, -3, 0}, most_before[] = {1, 3, 1};
+constexpr double least_before[] = {-3, -3, 0}, most_before[] = {3, 3, 1};
 
 }  // namespace
 

@@ -55,6 +55,16 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
                           table.line[rows[first]], t[first - 1], t[first], what_to_do));
 }
 
+void check_rows_follow(const Log& log, std::size_t read) {
+  constexpr double few = 0.05;  // of the readings: a sensor's own glitches
+  const std::size_t left = count_told(log.of(Role::housing)) + count_told(log.of(Role::core));
+  if (static_cast<double>(read - left) <= few * static_cast<double>(read)) return;
+  refuse_data(
+      fmt::format("{}: its temperatures leap from row to row and back as no motor's do, as if the rows were sorted by "
+                  "another column, or shuffled; give them in the order in which they were recorded, or their time_s.",
+                  log.name));
+}
+
 std::size_t put_in_order(std::vector<std::size_t>& rows, const std::vector<double>& time) {
   constexpr std::size_t most_late = 5;
   constexpr double most_share = 0.05;

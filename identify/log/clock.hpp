@@ -33,6 +33,10 @@ void pass_midnights(Log& log);
 /// Refuses time that runs backwards, with what to do about it. `rows`: of the table, in the log's order.
 void check_time(const Table& table, const Log& log, const std::vector<std::size_t>& rows);
 
+/// Refuses rows without a clock that stand in another order than they were recorded in, as those of data sets that were
+/// sorted by a column or shuffled. `read`: how many readings of the motor there were before its glitches were masked.
+void check_rows_follow(const Log& log, std::size_t read);
+
 /// Times told too coarsely for the rows, in whole seconds most often: rows that share one are spread until the next.
 void spread_shared_times(Log& log);
 

@@ -163,6 +163,20 @@ void ask_for_the_unit(const Table& table, const std::string& column, Role role) 
   }
 }
 
+/// Of the maps in a folder the one with the most columns, all of which the table has; empty: none.
+std::string map_that_fits(const Table& table, const std::string& folder) {
+  std::string best;
+  std::size_t most = 0;
+  std::error_code none;
+  for (const auto& file : std::filesystem::directory_iterator(folder, none)) {
+    const ColumnMap map = read_map(file.path().string());
+    const bool fits = std::all_of(map.columns.begin(), map.columns.end(),
+                                  [&](const auto& column) { return table.find(column.second.column) >= 0; });
+    if (fits && map.columns.size() > most) most = map.columns.size(), best = file.path().string();
+  }
+  return best;
+}
+
 }  // namespace
 
 std::size_t index_of(const Table& table, const Source& source) {
@@ -257,8 +271,11 @@ std::map<Role, Source> resolve(const Table& table, const ColumnMap& map, std::ve
     notes.push_back(fmt::format("Column '{}' is taken for the time{}.", time,
                                 table.of_day[index_of(table, {time})] ? "" : ", in seconds where no unit is said"));
   }
-  refuse_without_columns(table, found, !std::isnan(map.period_s));
+  const bool nobody_mapped = map.columns.empty() && std::isnan(map.period_s);
+  refuse_without_columns(table, found, !std::isnan(map.period_s),
+                         nobody_mapped ? map_that_fits(table, map.folder) : "");
   note_unused_columns(table, found, notes);
+  note_doubtful_columns(table, found, notes);
   for (const Role role : {Role::current, Role::iq, Role::id}) {
     const auto at = found.find(role);
     if (at != found.end() && named_rms(at->second.column) && !at->second.unit_said)

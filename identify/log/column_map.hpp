@@ -69,6 +69,7 @@ struct ColumnMap {
   double ambient_degC = missing;  // of logs without a sink
   std::string rows;               // "motor=left": only these (rows.hpp)
   std::string note;               // what a person should know of these logs, printed in the report
+  std::string folder;             // of maps that came along: a refusal names the one that fits
 };
 
 /// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and, where wanted, a

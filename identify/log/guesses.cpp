@@ -75,15 +75,19 @@ bool has_any(const std::string& name, std::initializer_list<const char*> words) 
   return std::any_of(words.begin(), words.end(), [&](const char* word) { return has_word(name, word); });
 }
 
+bool of_the_supply(const std::string& name) {
+  return has_any(name, {"supply", "batt", "bus", "ibus", "input", "current_in"});
+}
+
 /// What a column's name shows not to be what such a role asks: of what a motor drives, of what feeds it, or another
 /// quantity (current_temperature is no current, and StatorCurrent no stator's temperature).
 bool is_none(const std::string& name, Role role) {
   const bool temperature = has_any(name, {"temp", "degc", "\u00b0c"});
   if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan"});
   if (role == Role::current)
-    return temperature ||
-           has_any(name, {"supply", "batt", "bus", "ibus", "input", "current_in", "charge", "hour", "state", "mode",
-                          "pos", "angle", "speed", "vel", "rpm", "time", "volt", "torque"});
+    return temperature || of_the_supply(name) ||
+           has_any(name, {"charge", "hour", "state", "mode", "pos", "angle", "speed", "vel", "rpm", "time", "volt",
+                          "torque"});
   return std::find(std::begin(temperatures), std::end(temperatures), role) != std::end(temperatures) && !temperature &&
          has_any(name, {"current", "volt", "speed", "veloc", "torque", "resist", "ohm", "flux"});
 }
@@ -92,6 +96,12 @@ bool is_none(const std::string& name, Role role) {
 bool of_a_controller(const std::string& name) {
   return has_any(name, {"mos", "fet", "esc", "controller", "driver", "inverter", "igbt", "bridge", "stage", "board",
                         "pcb", "mcu", "cpu", "batt"});
+}
+
+/// Does a current's name say that the motor's own flows there?
+bool of_the_motor(const std::string& name) {
+  return has_any(name, {"motor", "mot", "phase", "winding", "stator", "coil", "iq", "i_q", "q-axis", "q_axis", "q_curr",
+                        "current_q"});
 }
 
 /// What was asked for, beside what is: Iq_setpoint and Iq_measured.
@@ -242,13 +252,37 @@ std::optional<Guess> likely_temperature(const Table& table, const std::map<Role,
 
 }  // namespace
 
+void note_doubtful_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
+  const auto foreign = [&](Role role) { return found.contains(role) && found.at(role).column != own_name(role); };
+  const auto volts = std::find_if(table.names.begin(), table.names.end(), [](const std::string& name) {
+    return has_any(name, {"volt", "vbat", "vbus", "vdc", "v_bat", "v_bus", "v_dc"}) && !of_the_motor(name);
+  });
+  for (const Role role : {Role::current, Role::iq}) {
+    if (!foreign(role) || of_the_motor(found.at(role).column)) continue;
+    const std::string& name = found.at(role).column;
+    if (volts != table.names.end() || of_the_supply(name))
+      notes.push_back(fmt::format(
+          "Column '{}'{} may be what the supply gives; the winding is heated by the motor's own current, which is "
+          "larger wherever the motor turns slower than the supply could drive it. Map that one, if there is one.",
+          name, volts == table.names.end() ? "" : fmt::format(" beside '{}'", *volts)));
+  }
+  for (const Role role : {Role::housing, Role::core}) {
+    if (foreign(role) && of_a_controller(found.at(role).column) && !of_the_motor(found.at(role).column))
+      notes.push_back(
+          fmt::format("Column '{}' is called like the temperature of what drives the motor; if it is that, nothing "
+                      "here holds for the motor: map the sensor in or on it as {}.",
+                      found.at(role).column, own_name(role)));
+  }
+}
+
 void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
   for (const auto& [guess, what] : useful_columns(table, found))
     notes.push_back(fmt::format("A column may be {} and is not used: if it is, say {}{}.", what, guess.option(),
                                 guess.role == Role::speed ? speed_words(guess.column) : ""));
 }
 
-void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row) {
+void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row,
+                            const std::string& map) {
   const auto none_of = [&](std::initializer_list<Role> roles) {
     return std::none_of(roles.begin(), roles.end(), [&](Role r) { return found.contains(r); });
   };
@@ -269,6 +303,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
     const auto guess = likely_column(table, taken_of(taken),
                                      {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
+                                      {Role::current, {"phase current", "phase_current", "phasecurrent"}},
                                       {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
                                       {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
                                       {Role::current, {"current", "curr", "strom", "amp"}},
@@ -278,6 +313,8 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                                       {Role::power, {"power", "watt", "leistung"}}});
     ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
     if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";
+    if (guess && guess->role == Role::current && !of_the_motor(guess->column))
+      hints.back() += " if it is the motor's own current and not the supply's";
     if (guess && guess->role == Role::power) hints.back() += " if that is what heats the winding";
   }
   if (none_of({Role::housing, Role::core})) {
@@ -290,6 +327,10 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
   }
   if (missing_ones.empty()) return;
   refuse_one_value_a_row(table);
+  if (!map.empty())
+    refuse_data(fmt::format("{}: {} {} missing under {} own names; say --map {}, which was made for such a table.",
+                            table.file, fmt::join(missing_ones, " and "), missing_ones.size() == 1 ? "is" : "are",
+                            missing_ones.size() == 1 ? "its" : "their", for_a_shell(map)));
   std::vector<std::string> useful;
   for (const auto& [guess, unused] : useful_columns(table, taken))
     useful.push_back(guess.option() + (guess.role == Role::speed ? speed_words(guess.column) : ""));

@@ -21,8 +21,12 @@ bool named_electrical(const std::string& name);
 /// Columns that nothing needs, and that would tell more.
 void note_unused_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes);
 
+/// Columns that were mapped, and whose names speak against it.
+void note_doubtful_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes);
+
 /// All that is missing at once, each with the column that its name speaks for, and with what else is of use. Throws
-/// UserError (unusable) if anything is; `by_row`: no clock is needed.
-void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row);
+/// UserError (unusable) if anything is; `by_row`: no clock is needed; `map`: one that came along and fits, if any.
+void refuse_without_columns(const Table& table, const std::map<Role, Source>& found, bool by_row,
+                            const std::string& map);
 
 }  // namespace identify

@@ -66,6 +66,15 @@ void forget_idle_heat(Log& log) {
   }
 }
 
+/// The least number of 16 bits, which PX4 writes where no sensor is.
+void forget_unread(std::vector<double>& cells, const std::string& column, std::vector<std::string>& notes) {
+  constexpr double no_reading = -32768;
+  const auto unread = std::count(cells.begin(), cells.end(), no_reading);
+  if (unread == 0) return;
+  std::replace(cells.begin(), cells.end(), no_reading, missing);
+  notes.push_back(fmt::format("Column '{}' is {:g} in {} rows, which count as not read.", column, no_reading, unread));
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
@@ -93,14 +102,15 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
     auto& to = log.of(role);
     to.reserve(rows.size());
     for (const std::size_t r : rows) to.push_back(from[r]);
+    const bool is_temperature = std::count(std::begin(temperatures), std::end(temperatures), role) > 0;
+    if (is_temperature) forget_unread(to, source.column, log.notes);
     const bool flows_or_turns = std::count(std::begin(signed_roles), std::end(signed_roles), role) > 0;
     if (const int bits = flows_or_turns ? give_sign(to) : 0; bits > 0)
       log.notes.push_back(fmt::format("Column '{}' shows negative numbers without their sign, {:.0f} for -1; read so.",
                                       source.column, std::exp2(bits) - 1));
     for (double& x : to) x = source.factor * (x + source.offset);
     // A sensor that is not connected; 0 degC or -1 all along, and not by a hundredth otherwise, is no weather.
-    const bool unplugged = std::count(std::begin(temperatures), std::end(temperatures), role) > 0 &&
-                           count_told(to) > 1 && stands(to) && (lowest(to) == 0 || lowest(to) == -1);
+    const bool unplugged = is_temperature && count_told(to) > 1 && stands(to) && (lowest(to) == 0 || lowest(to) == -1);
     if (unplugged) {
       log.notes.push_back(fmt::format("{} is {:g} in all rows, as of a sensor that is not connected, and was left out.",
                                       own_name(role), lowest(to)));
@@ -236,7 +246,9 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
     }
     forget_impossible(whole);
     forget_filled(whole);
+    const std::size_t read = count_told(whole.of(Role::housing)) + count_told(whole.of(Role::core));
     forget_glitches(whole);
+    if (by_row) check_rows_follow(whole, read);
     check_values(whole, motor);
     for (Log& log : parts_between_pauses(std::move(whole))) {
       mask(log);

@@ -15,6 +15,8 @@ constexpr double least_step_noise_share = 0.03;  // of a coarse sensor's step: t
 /// A winding's own noise is taken from so many of its residuals at least, and within these.
 constexpr double least_core_white_K = 0.5, most_core_white_K = 3;
 constexpr int enough_core_readings = 10;
+/// Windings of small motors have moved within this (noise.cpp), and of a typed table the last digit is this at best.
+constexpr double moves_within_s = 20, least_white_K = 0.02;
 
 /// What no model of a few nodes follows, as a share of the housing's rise, slow. A housing believed to the hundredths
 /// of a kelvin that its sensor wanders by outvotes a winding read twice a minute: of a motor recorded in host-sim
@@ -50,6 +52,17 @@ double off_by_reference(const Replayed& r) {
 
 /// Of a fit to the problem's noise; to compare fits that assume different noise.
 double evidence(const Problem& problem, const Fit& f) { return -f.surprise() - 2 * cost_of_noise(problem); }
+
+/// Takes less of a noise, down to `least_K`, while what the fit leaves is likelier so.
+void lessen(Problem& problem, const Fit& best, double Noise::*which, double least_K) {
+  double most = -1e300;
+  for (Problem less = problem; less.noise.*which > least_K; less.noise.*which *= 0.8) {
+    const double reached = evidence(less, fit(less, best.chosen, {&best}));
+    if (reached < most) return;
+    most = reached;
+    problem.noise.*which = less.noise.*which;
+  }
+}
 
 }  // namespace
 
@@ -109,18 +122,18 @@ void refine_core_noise(Problem& problem, const Fit& best) {
 }
 
 void refine_housing_noise(Problem& problem, const Fit& best) {
-  double most = -1e300;
-  const auto lessen = [&](double Noise::*which, double least_K) {
-    for (Problem less = problem; less.noise.*which > least_K; less.noise.*which *= 0.8) {
-      const double reached = evidence(less, fit(less, best.chosen, {&best}));
-      if (reached < most) return;
-      most = reached;
-      problem.noise.*which = less.noise.*which;
-    }
-  };
   if (const double step_K = coarsest_step_K(problem); step_K > 0)
-    lessen(&Noise::housing_white_K, least_step_noise_share * step_K);
-  lessen(&Noise::housing_slow_K, least_slow_K);
+    lessen(problem, best, &Noise::housing_white_K, least_step_noise_share * step_K);
+  lessen(problem, best, &Noise::housing_slow_K, least_slow_K);
+}
+
+bool refine_noise_of_slow_rows(Problem& problem, const Fit& best) {
+  const Noise told = problem.noise;
+  const auto slow = [](const Bins& log) { return log.interval_s > moves_within_s; };
+  if (!std::all_of(problem.logs.begin(), problem.logs.end(), slow)) return false;
+  lessen(problem, best, &Noise::core_white_K, least_white_K);
+  lessen(problem, best, &Noise::housing_white_K, least_white_K);
+  return problem.noise.core_white_K < told.core_white_K || problem.noise.housing_white_K < told.housing_white_K;
 }
 
 bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth) {

@@ -29,6 +29,11 @@ void refine_core_noise(Problem& problem, const Fit& best);
 /// less is taken; never more: the noise would swallow what is wrong.
 void refine_housing_noise(Problem& problem, const Fit& best);
 
+/// Readings further apart than a winding takes to move differ by more than their noise, as those of a table that
+/// somebody wrote every five minutes. Where the best model's residual is likelier with less, less is taken. Says
+/// whether it was.
+bool refine_noise_of_slow_rows(Problem& problem, const Fit& best);
+
 /// A meter that holds its reading and then catches up wanders faster and farther than rest shows. Too fast for what is
 /// wrong with a motor, that is taken for its noise where it is likelier than any slow disturbance. Says whether it was.
 bool take_sticking_for_noise(Problem& problem, const Fit& best, double worth);

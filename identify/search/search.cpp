@@ -115,6 +115,8 @@ void fit_alone_and_settle_noise(Problem& problem, Fit ordinary, const std::vecto
     problem.leeway = ordinary_leeway(problem, ordinary);  // a resistance at rest is as noisy as any other
   }
   fit_alone(problem, all, field);
+  // With less noise another cause may turn out the best, which leaves less.
+  for (int round = 0; round < 2 && refine_noise_of_slow_rows(problem, best()); ++round) fit_alone(problem, all, field);
   const double at_rest_K = problem.noise.housing_slow_K;
   if (!take_sticking_for_noise(problem, best(), margins.remains)) return;
   out.steps.push_back(

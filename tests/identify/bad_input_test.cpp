@@ -109,6 +109,26 @@ TEST(SlowBadInput, AMotorWithoutASheetThatDoesNotSettleGetsNoName) {
   says(r.out, "does not come near where it settles");
 }
 
+TEST(BadInput, AHousingThatSettledIsNotSaidToHaveNotWhereItsCoolingIsOpen) {
+  // Five hours of forty minutes, in whole degrees: convection and radiation share what grows with the rise.
+  tests::BenchOptions hours;
+  hours.motor = {.ohm = 1.5, .R1 = 0.08, .R2 = 0.12, .C1 = 4000, .C2 = 20000};
+  hours.seconds = 18000, hours.rate_Hz = 1.0 / 60;
+  hours.core_white_K = 0.3, hours.white_K = 0.3, hours.step_K = 1;
+  hours.current_A = [](double t, std::mt19937_64&) { return t < 10800 ? 18 : 0; };
+  hours.extra_housing_W = [](double, double, double housing_degC) {
+    const double rise_K = housing_degC - 24;
+    return -rise_K / 0.12 * 0.2 * rise_K / 20;
+  };
+  const auto in_degrees = [](auto& row, int) {
+    row[5] = fmt::format("{:.0f}", std::stod(row[5]));
+    return true;
+  };
+  const Outcome r = run(spoilt(in_degrees, hours));
+  EXPECT_EQ(r.out.find("where it settles"), std::string::npos) << r.out;
+  says(r.out, "this log leaves open how well the housing is cooled");
+}
+
 TEST(BadInput, NothingThatVaries) {
   refused(spoilt([](auto& row, int) { return row[3] = "30.1", row[5] = "", true; }), "same in all rows");
 }
@@ -217,6 +237,85 @@ TEST(SlowBadInput, ACurrentThatIsReadTooSmall) {
   };
   says(run(spoilt(in_mA) + " --motor ec-16-40w").out,
        "a current that is read 2.7 times too small; see the current's unit");
+}
+
+TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
+  // The load that a later clock would have moved away with the readings that it had moved.
+  tests::BenchOptions warm;
+  warm.seconds = 2600, warm.rate_Hz = 0.5;
+  warm.core_every_s = 2, warm.core_white_K = 0.1;
+  warm.white_K = 0.05, warm.step_K = 0.01;
+  warm.current_A = [](double t, std::mt19937_64&) { return t < 1500 ? 3 : 1.4; };
+  warm.extra_housing_W = [](double, double, double housing_degC) {
+    const double rise_K = housing_degC - 24;
+    return -rise_K / 16.3 * 0.3 * rise_K / 20;
+  };
+  std::vector<identify::Log> logs = tests::bench_logs({warm});
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + 740);
+  }
+  for (double& t : logs[0].of(identify::Role::time)) t -= 1480;
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.sentence.find("two clocks; align"), std::string::npos) << report.sentence;
+  says(report.sentence, "natural_convection");
+}
+
+TEST(BadInput, AMassThatIsStillColdWhereALogBeginsSoonAfterItsMotorIsNoSecondCause) {
+  // A frame that takes minutes has hardly warmed while the housing rose by 20 K: behind by nearly all of it.
+  tests::BenchOptions soon;
+  soon.seconds = 960, soon.rate_Hz = 2;
+  soon.core_every_s = 0.5, soon.core_white_K = 0.1;
+  soon.white_K = 0.05, soon.step_K = 0.01;
+  soon.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 150) < 75 ? 4 : 0; };
+  double mass_degC = soon.ambient_degC;
+  soon.extra_housing_W = [&](double, double, double housing_degC) {
+    const double to_mass_W = (housing_degC - mass_degC) / 10;
+    mass_degC += 0.005 * to_mass_W / 14;  // four times in a step of 20 ms
+    return -to_mass_W;
+  };
+  std::vector<identify::Log> logs = tests::bench_logs({soon});
+  for (auto& column : logs[0].columns) {
+    if (!column.empty()) column.erase(column.begin(), column.begin() + 120);
+  }
+  for (double& t : logs[0].of(identify::Role::time)) t -= 60;
+  says(identify::discover(logs, std::nullopt).sentence, "The motor behaves like third_mass:");
+}
+
+TEST(BadInput, HowFarAWindingMovesBetweenTheRowsOfATableIsNoNoise) {
+  // Ten minutes on and ten off, read every five: neighbouring readings are 17 K apart.
+  const auto discovered = [](double to_mass_K_per_W) {
+    tests::BenchOptions table;
+    table.motor = {.ohm = 1.5, .R1 = 0.08, .R2 = 0.12, .C1 = 4000, .C2 = 20000};
+    table.seconds = 14400, table.rate_Hz = 1.0 / 300;
+    table.core_every_s = 300, table.core_white_K = 0.3;
+    table.white_K = 0.3;
+    table.current_A = [](double t, std::mt19937_64&) { return std::fmod(t, 1200) < 600 ? 22 : 0; };
+    double mass_degC = table.ambient_degC;
+    table.extra_housing_W = [&](double, double, double housing_degC) {
+      const double to_mass_W = (housing_degC - mass_degC) / to_mass_K_per_W;
+      mass_degC += 0.005 * to_mass_W / 30000;  // four times in a step of 20 ms
+      return -to_mass_W;
+    };
+    return identify::discover(tests::bench_logs({table}), std::nullopt);
+  };
+  const identify::Report clean = discovered(1e9), wrong = discovered(0.3);
+  EXPECT_EQ(clean.verdict, identify::Verdict::adequate) << clean.sentence;
+  says(clean.sentence, "noisy by 0.");
+  EXPECT_NE(wrong.verdict, identify::Verdict::adequate) << wrong.sentence;
+}
+
+TEST(BadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
+  const auto no_core = [](auto& row, int i) {
+    if (i > 0) row[5] = "";
+    return true;
+  };
+  tests::BenchOptions controller, flange;
+  controller.motor.R1 = 0.5, controller.motor.R2 = 1.3, controller.motor.C2 = 60;
+  flange.motor.R2 = 16.3 / 5, flange.motor.C2 = 60;
+  const std::string asked = "less than a flange leaves of it: see whether the sensor sits on the motor";
+  says(run(spoilt(no_core, controller) + " --motor ec-16-40w").out, asked);
+  const Outcome cooled = run(spoilt(no_core, flange) + " --motor ec-16-40w");
+  EXPECT_EQ(cooled.out.find(asked), std::string::npos) << cooled.out;
 }
 
 TEST(BadInput, APauseInWhichTheMotorRanOn) {

@@ -984,10 +984,78 @@ TEST(Reader, ColumnsThatAreNormalisedAreRefused) {
 }
 
 TEST(Reader, ATemperatureBelowZeroKelvinIsASensorThatDidNotAnswer) {
-  const Log log = read(rows_with([](int i) { return i < 5 ? "-32768" : ""; }))[0];
+  const Log log = read(rows_with([](int i) { return i < 5 ? "-999" : ""; }))[0];
   EXPECT_EQ(identify::count_told(log.of(Role::housing)), 195u);
   says(fmt::format("{}", fmt::join(log.notes, " ")), "housing_degC is below 0 K in 5 rows, which count as not read.");
-  says(complaint(rows_with([](int i) { return i < 50 ? "-32768" : ""; })), "-80 to 600 degC is possible");
+  says(complaint(rows_with([](int i) { return i < 50 ? "-999" : ""; })), "-80 to 600 degC is possible");
+}
+
+TEST(Reader, TheLeastOf16BitsIsNoReadingHoweverOften) {
+  const std::string often = rows_with([](int i) { return i < 50 ? "-32768" : ""; });
+  for (const char* unit : {"", ":0.9degC"}) {
+    ColumnMap map;
+    if (*unit != 0) add_column(map, std::string("housing_degC=housing_degC") + unit);
+    const Log log = read(often, map)[0];
+    EXPECT_EQ(identify::count_told(log.of(Role::housing)), 150u) << unit;
+    says(fmt::format("{}", fmt::join(log.notes, " ")), "is -32768 in 50 rows, which count as not read.");
+  }
+}
+
+TEST(Reader, RowsWithoutAClockThatWereSortedOrShuffledAreNotTakenForALog) {
+  ColumnMap map;
+  map.period_s = 0.5;
+  std::vector<std::string> rows;
+  for (int i = 0; i < 400; ++i)
+    rows.push_back(fmt::format("{},{}\n", i < 200 ? 5 : 0, 20 + (i < 200 ? i : 400 - i) / 5.0));
+  const auto text = [&] { return fmt::format("current_A,housing_degC\n{}", fmt::join(rows, "")); };
+  EXPECT_EQ(read(text(), map)[0].of(Role::housing).size(), 400u);
+  std::shuffle(rows.begin(), rows.end(), std::mt19937_64(1));
+  says(complaint(text(), map), "as if the rows were sorted by another column, or shuffled");
+}
+
+TEST(Reader, AMapThatComesAlongIsNamedWhereItFits) {
+  ColumnMap none;
+  none.folder = HOTCORE_SOURCE_DIR "/identify/maps";
+  const std::string kaggle =
+      "u_q,coolant,stator_winding,motor_speed,i_d,i_q,stator_yoke,ambient,torque,profile_id\n"
+      "0,18,19,0,0,0,18,19,0,17\n";
+  says(complaint(kaggle, none), "say --map " HOTCORE_SOURCE_DIR "/identify/maps/paderborn_sessions.toml");
+  says(complaint("ms_today,current_motor,temp_motor\n0,1,20\n", none), "identify/maps/vesc.toml");
+  // Who has mapped a column is told of the others.
+  add_column(none, "housing_degC=stator_yoke");
+  says(complaint(kaggle, none), "map it with --column iq_A=i_q");
+}
+
+TEST(Reader, ACurrentThatMayBeTheSuppliesIsProposedAndReadWithAWordOfIt) {
+  // As APD and Castle export theirs, and PX4 and ArduPilot log them.
+  const char* whose = " if it is the motor's own current and not the supply's";
+  says(complaint("t,Volt,Curr,MotTemp\n0,24,1,20\n1,24,2,21\n"), std::string("current_A=Curr") + whose);
+  const std::string apd =
+      complaint("Voltage (V),Current (A),Phase Current (A),Temperature (C)\n70,1,4,20\n70,2,6,21\n");
+  says(apd, "current_A=\"Phase Current (A)\";");
+  const auto notes_of = [](const std::string& columns, const std::string& name) {
+    ColumnMap map;
+    add_column(map, "current_A=" + name);
+    return fmt::format(
+        "{}", fmt::join(read("time_s,housing_degC," + columns + "\n0,20,1,24\n1,21,2,24\n", map)[0].notes, " "));
+  };
+  says(notes_of("Curr,Volt", "Curr"), "Column 'Curr' beside 'Volt' may be what the supply gives");
+  says(notes_of("supply_current,x", "supply_current"), "'supply_current' may be what the supply gives");
+  for (const char* columns : {"motor_current,Volt", "I,V_phase", "current,motor_voltage"}) {
+    const std::string name(columns, std::string(columns).find(','));
+    EXPECT_EQ(notes_of(columns, name).find("supply"), std::string::npos) << columns;
+  }
+}
+
+TEST(Reader, AControllersTemperatureThatWasMappedIsSaidToBeOne) {
+  const auto notes_of = [](const std::string& name) {
+    ColumnMap map;
+    add_column(map, "housing_degC=" + name);
+    return fmt::format("{}", fmt::join(read("time_s,current_A," + name + "\n0,1,20\n1,2,21\n", map)[0].notes, " "));
+  };
+  for (const char* name : {"temp_mos", "esc_temperature", "driver temp"}) says(notes_of(name), "what drives the motor");
+  for (const char* name : {"temp_motor", "esc[0].motor_temperature", "T_case"})
+    EXPECT_EQ(notes_of(name).find("drives"), std::string::npos) << name;
 }
 
 TEST(Masks, ReadingsOfALooseSensorAreMaskedAndThoseOfAWindingAreNot) {
