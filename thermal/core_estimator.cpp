@@ -80,6 +80,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   sensor_degC_ = sensed_degC(ambient_degC_);
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // to begin is no movement
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
   due_K_ = due_margin_K_ = Row::Zero(n_ + 5);

@@ -680,6 +680,18 @@ TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
   EXPECT_GE(core.estimate().hottest_degC(), 40.0) << "10 K below the limit would be 35";
 }
 
+/// A motor that cools slowly to its ambient: nothing but the start moved the model, and that is no movement.
+TEST(Estimator, AStartIsNoMovementThatASensorWouldHaveToFollow) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    Bench b(reference::ec16(), with(trust), 25);
+    b.plant.degC = {30, 30};
+    for (int s = 0; s < 600; ++s) {
+      b.run(1, 0);
+      ASSERT_FALSE(b.flag(thermal::housing_contradicts)) << s << " s";
+    }
+  }
+}
+
 TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
   const auto set = thermal::three_phase_set(reference::ec16());
   CoreEstimator core(set, {});
