@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <new>
 
 namespace thermal {
 
@@ -206,7 +207,7 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   p_ = fp.lazyProduct(f.transpose());
   late_shared_K_ = f.lazyProduct(late_shared_K_).eval();
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
-  if (acquired_ && p_(ambient(), ambient()) < squared(ambient_worst_K))
+  if (heard_.acquired && p_(ambient(), ambient()) < squared(ambient_worst_K))
     p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
   if (ambient_known_) {
     p_.row(ambient()).setZero();
@@ -220,21 +221,22 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
 void CoreEstimator::hear_housing(Reading housing) {
   const float leak = dt_f / movement_memory_s;
   const float sensor_degC = static_cast<float>(sensor_degC_);
-  model_moved_K_ += sensor_degC - last_sensor_degC_ - leak * model_moved_K_;
+  heard_.model_moved_K += sensor_degC - last_sensor_degC_ - leak * heard_.model_moved_K;
   last_sensor_degC_ = sensor_degC;
   settle(1);
-  pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
+  heard_.pulled_K =
+      heard_.pulled_K > pull_forgotten_K_per_s * dt_f ? heard_.pulled_K - pull_forgotten_K_per_s * dt_f : 0.0f;
 
   const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
-  if (unheard_ < slow_window_steps) ++unheard_;
-  if (!usable && silent_ < missing_steps) ++silent_;
-  if (usable) silent_ = 0;
-  if ((silent_ == missing_steps || unheard_ == slow_window_steps) && !(flags_ & housing_missing)) {
+  if (heard_.unheard < slow_window_steps) ++heard_.unheard;
+  if (!usable && heard_.silent < missing_steps) ++heard_.silent;
+  if (usable) heard_.silent = 0;
+  if ((heard_.silent == missing_steps || heard_.unheard == slow_window_steps) && !(flags_ & housing_missing)) {
     flags_ |= housing_missing;
     p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
     p_(ambient(), ambient()) += squared(unheard_sigma_K);
   }
-  if (silent_ == missing_steps) {
+  if (heard_.silent == missing_steps) {
     window_ = 0;
     reading_sum_ = sensor_sum_ = 0.0;
   }
@@ -245,20 +247,21 @@ void CoreEstimator::hear_housing(Reading housing) {
 
   const float reading_degC = static_cast<float>(reading_sum_ / window_);
   const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / window_);
-  if (unheard_ < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
-  window_ = unheard_ = 0;
+  if (heard_.unheard < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
+  window_ = heard_.unheard = 0;
   reading_sum_ = sensor_sum_ = 0.0;
-  const bool first = !read_;
-  if (first) reading_slow_degC_ = reading_degC;
-  read_ = true;
-  if (!acquired_) {
-    // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
-    const double read_degC = housing_of_degC(static_cast<double>(reading_degC));
-    if (!ambient_known_ && read_degC < ambient_degC_) ambient_degC_ = read_degC > 20.0 ? read_degC : 20.0;
-  }
-  reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
-  reading_moved_K_ = reading_degC - reading_slow_degC_;
+  const bool first = !heard_.read;
+  if (first) heard_.reading_slow_degC = reading_degC;
+  heard_.read = true;
+  if (!heard_.acquired) believe_ambient_below(housing_of_degC(static_cast<double>(reading_degC)));
+  heard_.reading_slow_degC += (reading_degC - heard_.reading_slow_degC) * (window_steps * leak);
+  heard_.reading_moved_K = reading_degC - heard_.reading_slow_degC;
   correct_by_housing(reading_degC, innovation_K, first);
+}
+
+/// The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
+void CoreEstimator::believe_ambient_below(double housing_degC) {
+  if (!ambient_known_ && housing_degC < ambient_degC_) ambient_degC_ = housing_degC > 20.0 ? housing_degC : 20.0;
 }
 
 /// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
@@ -279,11 +282,12 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   const float noise = squared(settings_.housing_noise_K);
   const float late_K = static_cast<float>(late_K_);
   if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
-  if (!acquired_) {
+  if (!heard_.acquired) {
     if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
     const int h = housing_.node;
-    acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++met_ >= acquired_readings;
-    trusted_ambient_degC_ = ambient_degC_;
+    heard_.acquired =
+        p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++heard_.met >= acquired_readings;
+    heard_.trusted_ambient_degC = ambient_degC_;
     // After a reset the winding does not follow the housing by itself.
     raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
     return;
@@ -291,25 +295,25 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
   const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
   // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
-  const float expected_K = std::abs(model_moved_K_);
-  const float moved_K = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
+  const float expected_K = std::abs(heard_.model_moved_K);
+  const float moved_K = heard_.model_moved_K < 0.0f ? -heard_.reading_moved_K : heard_.reading_moved_K;
   const bool tested = expected_K >= enough_movement_K;
   if (tested && moved_K >= alive_share * expected_K) {
-    pulled_K_ = 0.0f;
-    trusted_ambient_degC_ = ambient_degC_;
+    heard_.pulled_K = 0.0f;
+    heard_.trusted_ambient_degC = ambient_degC_;
   }
-  const bool stuck = tested && moved_K < stuck_share * expected_K && pulled_K_ > suspicious_pull_K;
-  const bool colder = innovation_K < -least_gate_K && pulled_K_ >= most_pull_K;
+  const bool stuck = tested && moved_K < stuck_share * expected_K && heard_.pulled_K > suspicious_pull_K;
+  const bool colder = innovation_K < -least_gate_K && heard_.pulled_K >= most_pull_K;
   if (!(innovation_K > -gate_K) || (innovation_K < 0.0f && (stuck || colder))) {
     disbelieve_housing();
     return;
   }
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
-  const float left_K = most_pull_K - pulled_K_;
+  const float left_K = most_pull_K - heard_.pulled_K;
   // Hotter than believable counts for as much as is believable, and each further time for twice as much: a glitch of a
   // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
-  const float believed_K = std::fmax(gate_K, hotter_K_);
-  hotter_K_ = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
+  const float believed_K = std::fmax(gate_K, heard_.hotter_K);
+  heard_.hotter_K = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
   correct(seen, std::fmin(innovation_K, believed_K), noise, late_K, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
@@ -317,9 +321,9 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
 void CoreEstimator::disbelieve_housing() {
   if (!(flags_ & housing_contradicts)) {
     settle(due_steps_);
-    due_K_.head(n_).setConstant(pulled_K_);
-    due_K_[sensor()] = pulled_K_;
-    const float ambient_K = static_cast<float>(trusted_ambient_degC_ - ambient_degC_);
+    due_K_.head(n_).setConstant(heard_.pulled_K);
+    due_K_[sensor()] = heard_.pulled_K;
+    const float ambient_K = static_cast<float>(heard_.trusted_ambient_degC - ambient_degC_);
     due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
     due_steps_ = window_steps;
     p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
@@ -361,21 +365,23 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   Row shared = Row::Zero(n_ + 5);
   shared = p_.lazyProduct(seen);
   float expected_K2 = seen.dot(shared) + variance_K2;
-  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one.
+  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one. While the
+  // model cools a lag would make it read hotter, but so does a model that cools too fast, and that would be cold.
   const bool raises = late_K != 0.0f && innovation_K > 0.0f;
-  const float doubt = raises ? 1.0f - innovation_K / least_gate_K : 1.0f;
+  const float doubt = !raises ? 1.0f : late_K < 0.0f ? 0.0f : 1.0f - innovation_K / least_gate_K;
   const float lag_K = doubt > 0.0f ? doubt * (seen.dot(late_shared_K_) - late_K) : 0.0f;
   shared += late_shared_K_ * lag_K;
   expected_K2 += squared(lag_K);
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_ || (!acquired_ && innovation_K < 0.0f)) gain[ambient()] = 0.0f;  // the first reading did that
+  if (ambient_known_ || (!heard_.acquired && innovation_K < 0.0f))
+    gain[ambient()] = 0.0f;  // the first reading did that
   const float down_K = down_by(gain, innovation_K);
   if (down_K > most_down_K) gain *= most_down_K / down_K;
   if (std::isfinite(most_down_K)) {
-    const float pulled_K = pulled_K_ + down_by(gain, innovation_K);  // net: noise up and down cancels
-    pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
+    const float pulled_K = heard_.pulled_K + down_by(gain, innovation_K);  // net: noise up and down cancels
+    heard_.pulled_K = pulled_K > 0.0f ? pulled_K : 0.0f;
   }
   // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
   // less heat. So a winding falls no further than it would follow.
@@ -494,10 +500,41 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
   if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
     flags_ |= housing_contradicts;
-    acquired_ = true;
-    trusted_ambient_degC_ = ambient_degC_;
+    know_housing(sigma_K[housing_.node]);
+  }
+  publish();
+}
+
+/// As well as if its sensor had been heard for long.
+void CoreEstimator::know_housing(float sigma_K) {
+  const int h = housing_.node;
+  heard_.acquired = true;
+  heard_.trusted_ambient_degC = ambient_degC_;
+  p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K);
+}
+
+void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
+  const HeatMemory memory = save();
+  const HousingSensor<double> described = housing_;
+  const SensorRecord record = heard_;
+  const double sensed = sensor_degC_ + std::fmax(static_cast<double>(due_K_[sensor()]), 0.0);
+  const std::uint32_t missing = flags_ & housing_missing;
+  new (this) CoreEstimator(set, settings);  // in place: too large for the stack
+  restore(memory, 0.0);
+  const bool same_sensor = memory.node_count == n_ && described.node == housing_.node &&
+                           described.lag_s == housing_.lag_s && described.offset_K == housing_.offset_K &&
+                           described.gain_error == housing_.gain_error;
+  if (!same_sensor) return;
+  heard_ = record;
+  flags_ |= missing;
+  if (record.acquired && memory.disbelieved == 0) {
     const int h = housing_.node;
-    p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K[h]);
+    degC_[h] = static_cast<double>(memory.degC[h]);  // not raised: what the sensor said of it stays said
+    sensor_degC_ = sensed;
+    last_sensor_degC_ = static_cast<float>(sensed);
+    good_degC_ = degC_;
+    know_housing(memory.sigma_K[h]);
+    believe_ambient_below(static_cast<double>(memory.ambient_degC));  // it would show at once if that is too cold
   }
   publish();
 }
@@ -528,13 +565,11 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  acquired_ = read_ = false;
-  met_ = 0;
+  heard_ = {};
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   due_steps_ = 0;
   due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
-  pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
@@ -574,7 +609,7 @@ void CoreEstimator::guard_state() {
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
   sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
-  model_moved_K_ = 0.0f;
+  heard_.model_moved_K = 0.0f;
   late_K_ = 0.0;
   due_steps_ = 0;
   due_K_ = due_margin_K_ = Row::Zero(n_ + 5);

@@ -273,6 +273,21 @@ TEST(Estimator, CoolingThatDiffersFromTheSheetIsTakenUpOrReadsHotNeverCold) {
   }
 }
 
+/// What it had learned of better cooling in a load is too much of it at rest. A reading that is hotter then may come
+/// from a sensor that lags; it is believed all the same.
+TEST(Estimator, AModelThatCoolsTooFastIsHeldByItsSensor) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    wire::Motor real = reference::ec16();
+    real.R2_K_per_W *= 0.7;
+    Bench bench(real, with(thermal::sheet_trust), 25, reference::ec16());
+    bench.seed.seed(seed);
+    for (int minute = 0; minute < 40; ++minute) {
+      bench.run(60, minute % 20 < 15 ? 5 : 0);
+      EXPECT_GT(bench.core_error_K(), -0.3) << minute << " min, seed " << seed;
+    }
+  }
+}
+
 TEST(Estimator, AMissingHousingIsFlaggedInATenthOfASecondAndNeverReadsAsCold) {
   for (Reading lie : {missing, Reading{-273.0f, true}, Reading{300.0f, true}, Reading{std::nanf(""), true}}) {
     Bench honest(reference::ec16(), with(thermal::sheet_trust), 25),
@@ -734,6 +749,58 @@ TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAResetForBeingLessWrong)
     ASSERT_TRUE(again.estimate().flags & thermal::housing_contradicts);
   }
   EXPECT_GE(again.estimate().housing_degC, before_degC);
+}
+
+/// A model that is written while a motor works, again and again, makes a sensor that stands still no better than it is.
+TEST(Estimator, ASensorThatStandsStillIsNotBelievedAnewWithEachModel) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double every_s : {3.0, 8.0, 30.0}) {
+      Bench b(reference::ec16(), with(trust), 25);
+      b.run(120, 1);
+      const Reading stuck = b.honest();
+      thermal::Governor governor({});
+      double allowed_A = 0, hottest_degC = 0, next_s = every_s;
+      for (int i = 0; i < 40000; ++i) {
+        b.run(0.01, allowed_A * allowed_A, [&] { return stuck; });
+        allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+        hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+        ASSERT_LT(hottest_degC, 155 + 3) << "a model each " << every_s << " s, after " << i / 100 << " s";
+        if (i * 0.01 < next_s) continue;
+        next_s += every_s;
+        b.core.replace(thermal::three_phase_set(b.m), with(trust));
+      }
+      EXPECT_TRUE(b.flag(thermal::housing_contradicts));
+      EXPECT_GT(hottest_degC, 125) << "the limit was never near, so nothing was shown";
+    }
+  }
+}
+
+/// In a room of 25 degC, and when it has been at work; what the sensor said before stays said.
+TEST(Estimator, AnHonestSensorIsBelievedAsMuchByTheNextModel) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double i2_A2 : {0.0, 5.0}) {
+      Bench b(reference::ec16(), with(trust), 25), same(reference::ec16(), with(trust), 25);
+      for (int minute = 0; minute < 20; ++minute) {
+        for (Bench* one : {&b, &same}) one->run(60, minute % 4 == 3 ? 0 : i2_A2);
+        EXPECT_FALSE(b.flag(thermal::housing_contradicts)) << minute << " min";
+        EXPECT_NEAR(b.core.estimate().hottest_degC(), same.core.estimate().hottest_degC(), 3.0) << minute << " min";
+        b.core.replace(thermal::three_phase_set(b.m), with(trust));
+      }
+    }
+  }
+}
+
+/// Told that its sensor reads 10 K too much, a model believes it again as at a start.
+TEST(Estimator, ASensorThatIsDescribedAnewIsHeardAnew) {
+  Bench b(reference::ec16(), with(thermal::identified_trust), 25);
+  const auto high = [&] { return Reading{b.honest().value + 10, true}; };
+  b.run(120, 1, high);
+  auto set = thermal::three_phase_set(b.m);
+  set.housing.offset_K = 10;
+  b.core.replace(set, with(thermal::identified_trust));
+  b.run(60, 1, high);
+  EXPECT_FALSE(b.flag(thermal::housing_contradicts));
+  EXPECT_NEAR(b.core.estimate().housing_degC, static_cast<double>(b.plant.degC[1]), 1.0);
 }
 
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
