@@ -84,7 +84,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   last_sensor_degC_ = static_cast<float>(sensor_degC_);  // to begin is no movement
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
-  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
   const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
   const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
   late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
@@ -206,6 +206,8 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   const Covariance fp = f.lazyProduct(p_);
   p_ = fp.lazyProduct(f.transpose());
   late_shared_K_ = f.lazyProduct(late_shared_K_).eval();
+  doubted_K_ = f.lazyProduct(doubted_K_).eval();
+  kept_K_ = f.lazyProduct(kept_K_).eval();
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
   if (heard_.acquired && p_(ambient(), ambient()) < squared(ambient_worst_K))
     p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
@@ -220,7 +222,7 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
 /// Gathers half a second of readings, watches whether they move as the model does, and then lets them correct.
 void CoreEstimator::hear_housing(Reading housing) {
   const float leak = dt_f / movement_memory_s;
-  const float sensor_degC = static_cast<float>(sensor_degC_);
+  const float sensor_degC = static_cast<float>(sensor_degC_) - kept_K_[sensor()];
   heard_.model_moved_K += sensor_degC - last_sensor_degC_ - leak * heard_.model_moved_K;
   last_sensor_degC_ = sensor_degC;
   settle(1);
@@ -267,7 +269,7 @@ void CoreEstimator::believe_ambient_below(double housing_degC) {
 /// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
 void CoreEstimator::meet_sensor(float reading_degC) {
   sensor_degC_ = static_cast<double>(reading_degC);
-  last_sensor_degC_ = reading_degC;
+  last_sensor_degC_ = reading_degC - kept_K_[sensor()];
   p_.row(sensor()).setZero();
   p_.col(sensor()).setZero();
   late_shared_K_[sensor()] = 0.0f;
@@ -283,6 +285,7 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   const float late_K = static_cast<float>(late_K_);
   if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
   if (!heard_.acquired) {
+    const Vector before_degC = degC_;
     if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
     const int h = housing_.node;
     heard_.acquired =
@@ -290,6 +293,10 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
     heard_.trusted_ambient_degC = ambient_degC_;
     // After a reset the winding does not follow the housing by itself.
     raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
+    if (!remembers_) return;
+    const Vector fall_K = before_degC - degC_;
+    doubted_K_.head(n_) += fall_K.cast<float>();
+    kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
@@ -301,10 +308,12 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   if (tested && moved_K >= alive_share * expected_K) {
     heard_.pulled_K = 0.0f;
     heard_.trusted_ambient_degC = ambient_degC_;
+    doubted_K_.setZero();
   }
   const bool stuck = tested && moved_K < stuck_share * expected_K && heard_.pulled_K > suspicious_pull_K;
-  const bool colder = innovation_K < -least_gate_K && heard_.pulled_K >= most_pull_K;
-  if (!(innovation_K > -gate_K) || (innovation_K < 0.0f && (stuck || colder))) {
+  const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
+  const bool colder = innovation_K < -least_gate_K - kept_K && heard_.pulled_K >= most_pull_K;
+  if (!(innovation_K > -gate_K - kept_K) || (innovation_K < 0.0f && (stuck || colder))) {
     disbelieve_housing();
     return;
   }
@@ -321,8 +330,9 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
 void CoreEstimator::disbelieve_housing() {
   if (!(flags_ & housing_contradicts)) {
     settle(due_steps_);
-    due_K_.head(n_).setConstant(heard_.pulled_K);
-    due_K_[sensor()] = heard_.pulled_K;
+    due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
+    due_K_ = due_margin_K_ + Row::Constant(n_ + 5, heard_.pulled_K);
+    doubted_K_.setZero();
     const float ambient_K = static_cast<float>(heard_.trusted_ambient_degC - ambient_degC_);
     due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
     due_steps_ = window_steps;
@@ -462,7 +472,8 @@ HeatMemory CoreEstimator::save() const {
                     flags_ & housing_contradicts ? 1u : 0u,
                     late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
   for (int i = 0; i < n_; ++i) {
-    memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f);  // what is due now is so later
+    // What is due now is so later, and what is doubted not proven.
+    memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
     memory.sigma_K[i] = estimate_.sigma_K[i];
   }
   return memory;
@@ -495,9 +506,15 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   bool soaked = true;
   for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
+  remembers_ = true;
   if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K) late_K_ = static_cast<double>(memory.late_K);
   if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+  for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
+    const double saved = static_cast<double>(memory.degC[i]);
+    if (plausible(saved)) doubted_K_[i] = static_cast<float>(std::fmin(saved - degC_[i], 0.0));
+    kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
+  }
   if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
     flags_ |= housing_contradicts;
     know_housing(sigma_K[housing_.node]);
@@ -517,6 +534,7 @@ void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings&
   const HeatMemory memory = save();
   const HousingSensor<double> described = housing_;
   const SensorRecord record = heard_;
+  const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
   const double sensed = sensor_degC_ + std::fmax(static_cast<double>(due_K_[sensor()]), 0.0);
   const std::uint32_t missing = flags_ & housing_missing;
   new (this) CoreEstimator(set, settings);  // in place: too large for the stack
@@ -529,7 +547,8 @@ void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings&
   flags_ |= missing;
   if (record.acquired && memory.disbelieved == 0) {
     const int h = housing_.node;
-    degC_[h] = static_cast<double>(memory.degC[h]);  // not raised: what the sensor said of it stays said
+    degC_[h] = static_cast<double>(memory.degC[h] - doubted_K);  // not raised: what the sensor said of it stays said
+    doubted_K_[h] = doubted_K;
     sensor_degC_ = sensed;
     last_sensor_degC_ = static_cast<float>(sensed);
     good_degC_ = degC_;
@@ -568,8 +587,9 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   heard_ = {};
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
+  remembers_ = false;
   due_steps_ = 0;
-  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
@@ -594,6 +614,10 @@ void CoreEstimator::guard_state() {
   bool sure = true;
   for (int i = 0; i < n_ + 5; ++i)
     sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f && std::abs(late_shared_K_[i]) < 1e3f;
+  for (int i = 0; i < n_ + 5; ++i) {
+    if (!(std::abs(doubted_K_[i]) < 1e3f)) doubted_K_[i] = most_sigma_K;
+    if (!(std::abs(kept_K_[i]) < 1e3f)) kept_K_[i] = 0.0f;
+  }
   if (!sure) widen_all();
   if (good) {
     good_degC_ = degC_;
@@ -624,7 +648,7 @@ void CoreEstimator::publish() {
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
                                    : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
-                                         std::fmax(due_margin_K_[i], 0.0f);
+                                         std::fmax(due_margin_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
     estimate_.max_degC[i] = max_degC_[i];
   }
   estimate_.housing_degC = degC_[housing_.node];

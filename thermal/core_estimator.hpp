@@ -173,6 +173,11 @@ class CoreEstimator {
   Row due_margin_K_;        // and what it has yet to take from the margins: surer at once, they would be colder at once
   int due_steps_ = 0;
   HeatInput<> input_;
+  // How much hotter the states would be had the first readings after a reset not lowered what was remembered. Counts as
+  // margin until the sensor proves that it lives: it may have come off, or sit on another motor.
+  Row doubted_K_;
+  Row kept_K_;              // how much hotter the nodes are than a housing that was off for long; no sensor has to show
+  bool remembers_ = false;  // since the reset: more than a guess
 
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;  // of readings in this window
   int window_ = 0;                               // steps of them

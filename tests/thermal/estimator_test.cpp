@@ -803,6 +803,79 @@ TEST(Estimator, ASensorThatIsDescribedAnewIsHeardAnew) {
   EXPECT_NEAR(b.core.estimate().housing_degC, static_cast<double>(b.plant.degC[1]), 1.0);
 }
 
+/// A motor that has worked at its limit for some minutes, and a reset of which nobody knows how long it took.
+struct Restarted {
+  Bench b;
+  thermal::Governor governor;
+  double most_A, allowed_A = 0, A2s = 0, hottest_degC = 0;
+
+  Restarted(const wire::Motor& m, float most, thermal::Trust trust, bool cooled, bool remembered = true)
+      : b(m, with(trust), 25), governor(settings(most)), most_A(static_cast<double>(most)) {
+    for (int i = 0; remembered && i < 20; ++i) {
+      run(10, most_A, [this] { return b.honest(); });
+      run(10, 0, [this] { return b.honest(); });
+    }
+    const thermal::HeatMemory memory = remembered ? b.core.save() : thermal::HeatMemory{4, {25, 25, 25, 25}, {}, 25};
+    if (cooled) b.plant.degC = {25, 25};
+    b.core = CoreEstimator(thermal::three_phase_set(m), with(trust));
+    b.core.restore(memory, -1);
+    governor = thermal::Governor(settings(most));
+    A2s = hottest_degC = 0;
+  }
+  static thermal::GovernorSettings settings(float most_A) {
+    thermal::GovernorSettings s;
+    s.max_A = most_A;
+    return s;
+  }
+  template <class Sensor>
+  void run(double seconds, double asked_A, Sensor sensor) {
+    for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
+      const double i2_A2 = std::pow(std::min(asked_A, allowed_A), 2);
+      b.run(0.01, i2_A2, sensor);
+      allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+      A2s += i2_A2 * 0.01;
+      hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+    }
+  }
+};
+
+TEST(Estimator, ASensorThatCameOffDuringAResetLetsNoWindingPassItsLimit) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      for (const double rest_s : {0.6, 30.0}) {
+        Restarted hot(m, most_A, trust, false);
+        const auto room = [&] { return Reading{25.0f + static_cast<float>(hot.b.noise(hot.b.seed)), true}; };
+        hot.run(rest_s, 0, room);
+        for (int i = 0; i < 20; ++i) {
+          hot.run(20, hot.most_A, room);
+          hot.run(10, 0, room);
+        }
+        EXPECT_LE(hot.hottest_degC, 155 + 3) << "R1 " << m.R1_K_per_W << ", after " << rest_s << " s";
+        EXPECT_TRUE(hot.b.flag(thermal::housing_contradicts));
+      }
+    }
+  }
+}
+
+/// What the memory of a hot motor costs one that has cooled meanwhile: until its housing has followed a load by 3 K.
+TEST(Estimator, AMotorThatHasCooledDuringAResetIsBelievedWithinAMinuteOfLoad) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      Restarted cooled(m, most_A, trust, true), cold(m, most_A, trust, true, false);
+      for (Restarted* one : {&cooled, &cold}) {
+        const auto honest = [one] { return one->b.honest(); };
+        one->run(60, one->most_A, honest);
+        one->run(10, 0, honest);
+        one->A2s = 0;
+        one->run(60, one->most_A, honest);
+        EXPECT_FALSE(one->b.flag(thermal::housing_contradicts));
+        EXPECT_LE(one->hottest_degC, 155 + 3);
+      }
+      EXPECT_GE(cooled.A2s, 0.95 * cold.A2s) << "R1 " << m.R1_K_per_W;
+    }
+  }
+}
+
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   core.restore({4, {140, 140, 140, 60}, {120, 120, 120, 5}, 40}, -1);
