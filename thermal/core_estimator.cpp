@@ -278,6 +278,16 @@ void CoreEstimator::meet_sensor(float reading_degC) {
   raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
+/// The minute is over, and a start that was a guess would contradict the sensor for hours: it is as cold as it reads,
+/// with what is left as margin.
+void CoreEstimator::doubt(float left_K) {
+  degC_.array() -= static_cast<double>(left_K);
+  sensor_degC_ -= static_cast<double>(left_K);
+  last_sensor_degC_ -= left_K;
+  doubted_K_.head(n_).array() += left_K;
+  doubted_K_[sensor()] += left_K;
+}
+
 void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
   Row seen = Row::Zero(n_ + 5);
   seen[sensor()] = 1.0f;
@@ -293,10 +303,13 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
     heard_.trusted_ambient_degC = ambient_degC_;
     // After a reset the winding does not follow the housing by itself.
     raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
-    if (!remembers_) return;
-    const Vector fall_K = before_degC - degC_;
-    doubted_K_.head(n_) += fall_K.cast<float>();
-    kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
+    if (remembers_) {
+      const Vector fall_K = before_degC - degC_;
+      doubted_K_.head(n_) += fall_K.cast<float>();
+      kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
+    }
+    const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
+    if (heard_.acquired && !remembers_ && left_K > least_gate_K) doubt(left_K);
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);

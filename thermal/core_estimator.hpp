@@ -137,6 +137,7 @@ class CoreEstimator {
   void hear_housing(Reading housing);
   void correct_by_housing(float reading_degC, float innovation_K, bool first);
   void meet_sensor(float reading_degC);
+  void doubt(float left_K);
   void believe_ambient_below(double housing_degC);
   void know_housing(float sigma_K);
   double sensed_degC(double housing_degC) const;

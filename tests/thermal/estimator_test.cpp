@@ -876,6 +876,31 @@ TEST(Estimator, AMotorThatHasCooledDuringAResetIsBelievedWithinAMinuteOfLoad) {
   }
 }
 
+/// A cold motor that begins without a memory and is loaded at once.
+TEST(Estimator, AStartThatIsTooHotDoesNotContradictAnHonestSensor) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      Restarted unknown(m, most_A, trust, true, false), cold(m, most_A, trust, true, false);
+      unknown.b.core.start_hot();
+      for (Restarted* one : {&unknown, &cold}) {
+        const auto honest = [one] { return one->b.honest(); };
+        for (int i = 0; i < 4; ++i) {
+          one->run(20, one->most_A, honest);
+          one->run(10, 0, honest);
+        }
+        one->A2s = 0;
+        for (int i = 0; i < 10; ++i) {
+          one->run(20, one->most_A, honest);
+          one->run(10, 0, honest);
+        }
+        EXPECT_FALSE(one->b.flag(thermal::housing_contradicts));
+        EXPECT_LE(one->hottest_degC, 155 + 3);
+      }
+      EXPECT_GE(unknown.A2s, 0.95 * cold.A2s) << "R1 " << m.R1_K_per_W;
+    }
+  }
+}
+
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   core.restore({4, {140, 140, 140, 60}, {120, 120, 120, 5}, 40}, -1);
