@@ -32,6 +32,9 @@ constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached 
 // Of what the model expects: a sensor that comes off by half is not alive. Above 0.7 honest sensors fail as well, on
 // motors that their sheet does not fit (at 0.9 these lose a tenth of their A^2 s, at 0.7 a hundredth).
 constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
+// A reading that falls by twice what the model does, and by this more, has come off a motor that cools: chosen; a motor
+// of 60 K above a frost that its model does not know of falls by as much more in two minutes.
+constexpr float off_share = 2.0f, off_K = 10.0f;
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
 constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
@@ -309,7 +312,7 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
       kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
     }
     const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
-    if (heard_.acquired && !remembers_ && left_K > least_gate_K) doubt(left_K);
+    if (heard_.acquired && guessed_ && left_K > least_gate_K) doubt(left_K);
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
@@ -318,7 +321,8 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
   const float expected_K = std::abs(heard_.model_moved_K);
   const float moved_K = heard_.model_moved_K < 0.0f ? -heard_.reading_moved_K : heard_.reading_moved_K;
   const bool tested = expected_K >= enough_movement_K;
-  if (tested && moved_K >= alive_share * expected_K) {
+  const bool fallen = moved_K > off_share * expected_K && moved_K > expected_K + off_K;
+  if (tested && moved_K >= alive_share * expected_K && !fallen) {
     heard_.pulled_K = 0.0f;
     heard_.trusted_ambient_degC = ambient_degC_;
     doubted_K_.setZero();
@@ -519,14 +523,14 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   bool soaked = true;
   for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
-  remembers_ = true;
+  remembers_ = memory.degC[housing_.node] > settings_.ambient_degC;  // or it was no warmer than its surroundings
   if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K) late_K_ = static_cast<double>(memory.late_K);
   if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
   for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
     const double saved = static_cast<double>(memory.degC[i]);
     if (plausible(saved)) doubted_K_[i] = static_cast<float>(std::fmin(saved - degC_[i], 0.0));
-    kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
+    if (remembers_) kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
   }
   if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
     flags_ |= housing_contradicts;
@@ -579,6 +583,7 @@ void CoreEstimator::start_hot() {
   for (float& s : sigma_K)
     s = settings_.margin_sigmas > 0.0f ? unknown_below_K / settings_.margin_sigmas : start_sigma_K;
   begin_anew(sigma_K);
+  guessed_ = true;
 }
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
@@ -600,7 +605,7 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   heard_ = {};
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
-  remembers_ = false;
+  remembers_ = guessed_ = false;
   due_steps_ = 0;
   due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known

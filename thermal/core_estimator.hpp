@@ -177,8 +177,8 @@ class CoreEstimator {
   // How much hotter the states would be had the first readings after a reset not lowered what was remembered. Counts as
   // margin until the sensor proves that it lives: it may have come off, or sit on another motor.
   Row doubted_K_;
-  Row kept_K_;              // how much hotter the nodes are than a housing that was off for long; no sensor has to show
-  bool remembers_ = false;  // since the reset: more than a guess
+  Row kept_K_;  // how much hotter the nodes are than a housing that was off for long; no sensor has to show
+  bool remembers_ = false, guessed_ = false;  // since the reset: a warm motor; nothing
 
   double reading_sum_ = 0.0, sensor_sum_ = 0.0;  // of readings in this window
   int window_ = 0;                               // steps of them

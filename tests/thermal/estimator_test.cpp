@@ -347,6 +347,34 @@ TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIs
   }
 }
 
+/// A motor that rests cools, and so does a sensor that comes off it, only more.
+TEST(Estimator, ASensorThatComesOffACoolingMotorIsFound) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double falls_s : {5.0, 10.0, 30.0}) {
+      Bench b(reference::ec16(), with(trust), 30);
+      thermal::Governor governor({});
+      double allowed_A = 0, sensed_degC = 30, hottest_degC = 0;
+      const auto run = [&](double seconds, double asked_A, bool on) {
+        for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
+          b.run(0.01, std::pow(std::min(asked_A, allowed_A), 2), [&] {
+            sensed_degC =
+                on ? static_cast<double>(b.honest().value) : sensed_degC + (30 - sensed_degC) * 0.01 / falls_s;
+            return Reading{static_cast<float>(sensed_degC), true};
+          });
+          allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+          hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+        }
+      };
+      run(300, 20, true);
+      run(60, 0, true);
+      run(60, 0, false);
+      EXPECT_TRUE(b.flag(thermal::housing_contradicts)) << falls_s << " s";
+      run(200, 20, false);
+      EXPECT_LE(hottest_degC, 155 + 3) << falls_s << " s";
+    }
+  }
+}
+
 /// A reset comes into a load, and the sensor stands still from there on, or where it was never right. Neither is the
 /// jump to its first reading a movement that it would have to follow, nor is it believed without limit for ever because
 /// it might lag.
