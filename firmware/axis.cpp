@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <limits>
-#include <new>
 
 #include "thermal/indices.hpp"
 #include "thermal/validate.hpp"
@@ -56,9 +55,7 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
 
 void Axis::configure(const AxisSetup& setup, HeatModel heat) {
   if (heat == HeatModel::changed && usable(setup.heat)) {  // without a model the old one goes on: it knows what is hot
-    const thermal::HeatMemory memory = core_.save();
-    new (&core_) thermal::CoreEstimator(setup.heat, setup.estimator);  // too large for the stack
-    core_.restore(memory, 0.0);
+    core_.replace(setup.heat, setup.estimator);
     senses_housing_ = setup.senses_housing;
   }
   allowance_ = {0.0f, wire::Limit::thermal_late};

@@ -94,9 +94,9 @@ class Axis {
   Axis& operator=(const Axis&) = delete;
 
   /// Another set for a disarmed axis; the fast lane takes it over at its next tick. With the heat model it had, the
-  /// estimate goes on as it was. With another one the temperatures stay, but none is below the ambient believed: what
-  /// the old model had learned of its surroundings proves nothing about the new one. A set without a model leaves the
-  /// estimate to the old one.
+  /// estimate goes on as it was. With another one the temperatures stay, but no winding is below the ambient believed:
+  /// what the old model had learned of its surroundings proves nothing about the new one; what was found out about the
+  /// housing sensor does. A set without a model leaves the estimate to the old one.
   void configure(const AxisSetup& setup, HeatModel heat);
   /// Off or tripped, and nothing posted that could change that.
   bool at_rest() const;

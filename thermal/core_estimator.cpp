@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <new>
 
 namespace thermal {
 
@@ -31,6 +32,9 @@ constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached 
 // Of what the model expects: a sensor that comes off by half is not alive. Above 0.7 honest sensors fail as well, on
 // motors that their sheet does not fit (at 0.9 these lose a tenth of their A^2 s, at 0.7 a hundredth).
 constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
+// A reading that falls by twice what the model does, and by this more, has come off a motor that cools: chosen; a motor
+// of 60 K above a frost that its model does not know of falls by as much more in two minutes.
+constexpr float off_share = 2.0f, off_K = 10.0f;
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
 constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
@@ -80,9 +84,10 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   sensor_degC_ = sensed_degC(ambient_degC_);
+  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // to begin is no movement
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
-  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
+  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
   const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
   const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
   late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
@@ -204,8 +209,10 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   const Covariance fp = f.lazyProduct(p_);
   p_ = fp.lazyProduct(f.transpose());
   late_shared_K_ = f.lazyProduct(late_shared_K_).eval();
+  doubted_K_ = f.lazyProduct(doubted_K_).eval();
+  kept_K_ = f.lazyProduct(kept_K_).eval();
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
-  if (acquired_ && p_(ambient(), ambient()) < squared(ambient_worst_K))
+  if (heard_.acquired && p_(ambient(), ambient()) < squared(ambient_worst_K))
     p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
   if (ambient_known_) {
     p_.row(ambient()).setZero();
@@ -218,22 +225,23 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
 /// Gathers half a second of readings, watches whether they move as the model does, and then lets them correct.
 void CoreEstimator::hear_housing(Reading housing) {
   const float leak = dt_f / movement_memory_s;
-  const float sensor_degC = static_cast<float>(sensor_degC_);
-  model_moved_K_ += sensor_degC - last_sensor_degC_ - leak * model_moved_K_;
+  const float sensor_degC = static_cast<float>(sensor_degC_) - kept_K_[sensor()];
+  heard_.model_moved_K += sensor_degC - last_sensor_degC_ - leak * heard_.model_moved_K;
   last_sensor_degC_ = sensor_degC;
   settle(1);
-  pulled_K_ = pulled_K_ > pull_forgotten_K_per_s * dt_f ? pulled_K_ - pull_forgotten_K_per_s * dt_f : 0.0f;
+  heard_.pulled_K =
+      heard_.pulled_K > pull_forgotten_K_per_s * dt_f ? heard_.pulled_K - pull_forgotten_K_per_s * dt_f : 0.0f;
 
   const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
-  if (unheard_ < slow_window_steps) ++unheard_;
-  if (!usable && silent_ < missing_steps) ++silent_;
-  if (usable) silent_ = 0;
-  if ((silent_ == missing_steps || unheard_ == slow_window_steps) && !(flags_ & housing_missing)) {
+  if (heard_.unheard < slow_window_steps) ++heard_.unheard;
+  if (!usable && heard_.silent < missing_steps) ++heard_.silent;
+  if (usable) heard_.silent = 0;
+  if ((heard_.silent == missing_steps || heard_.unheard == slow_window_steps) && !(flags_ & housing_missing)) {
     flags_ |= housing_missing;
     p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
     p_(ambient(), ambient()) += squared(unheard_sigma_K);
   }
-  if (silent_ == missing_steps) {
+  if (heard_.silent == missing_steps) {
     window_ = 0;
     reading_sum_ = sensor_sum_ = 0.0;
   }
@@ -244,26 +252,27 @@ void CoreEstimator::hear_housing(Reading housing) {
 
   const float reading_degC = static_cast<float>(reading_sum_ / window_);
   const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / window_);
-  if (unheard_ < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
-  window_ = unheard_ = 0;
+  if (heard_.unheard < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
+  window_ = heard_.unheard = 0;
   reading_sum_ = sensor_sum_ = 0.0;
-  const bool first = !read_;
-  if (first) reading_slow_degC_ = reading_degC;
-  read_ = true;
-  if (!acquired_) {
-    // The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
-    const double read_degC = housing_of_degC(static_cast<double>(reading_degC));
-    if (!ambient_known_ && read_degC < ambient_degC_) ambient_degC_ = read_degC > 20.0 ? read_degC : 20.0;
-  }
-  reading_slow_degC_ += (reading_degC - reading_slow_degC_) * (window_steps * leak);
-  reading_moved_K_ = reading_degC - reading_slow_degC_;
+  const bool first = !heard_.read;
+  if (first) heard_.reading_slow_degC = reading_degC;
+  heard_.read = true;
+  if (!heard_.acquired) believe_ambient_below(housing_of_degC(static_cast<double>(reading_degC)));
+  heard_.reading_slow_degC += (reading_degC - heard_.reading_slow_degC) * (window_steps * leak);
+  heard_.reading_moved_K = reading_degC - heard_.reading_slow_degC;
   correct_by_housing(reading_degC, innovation_K, first);
+}
+
+/// The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
+void CoreEstimator::believe_ambient_below(double housing_degC) {
+  if (!ambient_known_ && housing_degC < ambient_degC_) ambient_degC_ = housing_degC > 20.0 ? housing_degC : 20.0;
 }
 
 /// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
 void CoreEstimator::meet_sensor(float reading_degC) {
   sensor_degC_ = static_cast<double>(reading_degC);
-  last_sensor_degC_ = reading_degC;
+  last_sensor_degC_ = reading_degC - kept_K_[sensor()];
   p_.row(sensor()).setZero();
   p_.col(sensor()).setZero();
   late_shared_K_[sensor()] = 0.0f;
@@ -272,43 +281,65 @@ void CoreEstimator::meet_sensor(float reading_degC) {
   raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
+/// The minute is over, and a start that was a guess would contradict the sensor for hours: it is as cold as it reads,
+/// with what is left as margin.
+void CoreEstimator::doubt(float left_K) {
+  degC_.array() -= static_cast<double>(left_K);
+  sensor_degC_ -= static_cast<double>(left_K);
+  last_sensor_degC_ -= left_K;
+  doubted_K_.head(n_).array() += left_K;
+  doubted_K_[sensor()] += left_K;
+}
+
 void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
   Row seen = Row::Zero(n_ + 5);
   seen[sensor()] = 1.0f;
   const float noise = squared(settings_.housing_noise_K);
   const float late_K = static_cast<float>(late_K_);
   if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
-  if (!acquired_) {
+  if (!heard_.acquired) {
+    const Vector before_degC = degC_;
     if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
     const int h = housing_.node;
-    acquired_ = p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++met_ >= acquired_readings;
-    trusted_ambient_degC_ = ambient_degC_;
+    heard_.acquired =
+        p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++heard_.met >= acquired_readings;
+    heard_.trusted_ambient_degC = ambient_degC_;
     // After a reset the winding does not follow the housing by itself.
     raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
+    if (remembers_) {
+      const Vector fall_K = before_degC - degC_;
+      doubted_K_.head(n_) += fall_K.cast<float>();
+      kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
+    }
+    const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
+    if (heard_.acquired && guessed_ && left_K > least_gate_K) doubt(left_K);
     return;
   }
   const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
   const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
   // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
-  const float expected_K = std::abs(model_moved_K_);
-  const float moved_K = model_moved_K_ < 0.0f ? -reading_moved_K_ : reading_moved_K_;
+  const float expected_K = std::abs(heard_.model_moved_K);
+  const float moved_K = heard_.model_moved_K < 0.0f ? -heard_.reading_moved_K : heard_.reading_moved_K;
   const bool tested = expected_K >= enough_movement_K;
-  if (tested && moved_K >= alive_share * expected_K) {
-    pulled_K_ = 0.0f;
-    trusted_ambient_degC_ = ambient_degC_;
+  const bool fallen = moved_K > off_share * expected_K && moved_K > expected_K + off_K;
+  if (tested && moved_K >= alive_share * expected_K && !fallen) {
+    heard_.pulled_K = 0.0f;
+    heard_.trusted_ambient_degC = ambient_degC_;
+    doubted_K_.setZero();
   }
-  const bool stuck = tested && moved_K < stuck_share * expected_K && pulled_K_ > suspicious_pull_K;
-  const bool colder = innovation_K < -least_gate_K && pulled_K_ >= most_pull_K;
-  if (!(innovation_K > -gate_K) || (innovation_K < 0.0f && (stuck || colder))) {
+  const bool stuck = tested && moved_K < stuck_share * expected_K && heard_.pulled_K > suspicious_pull_K;
+  const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
+  const bool colder = innovation_K < -least_gate_K - kept_K && heard_.pulled_K >= most_pull_K;
+  if (!(innovation_K > -gate_K - kept_K) || (innovation_K < 0.0f && (stuck || colder))) {
     disbelieve_housing();
     return;
   }
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
-  const float left_K = most_pull_K - pulled_K_;
+  const float left_K = most_pull_K - heard_.pulled_K;
   // Hotter than believable counts for as much as is believable, and each further time for twice as much: a glitch of a
   // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
-  const float believed_K = std::fmax(gate_K, hotter_K_);
-  hotter_K_ = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
+  const float believed_K = std::fmax(gate_K, heard_.hotter_K);
+  heard_.hotter_K = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
   correct(seen, std::fmin(innovation_K, believed_K), noise, late_K, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
@@ -316,9 +347,10 @@ void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, b
 void CoreEstimator::disbelieve_housing() {
   if (!(flags_ & housing_contradicts)) {
     settle(due_steps_);
-    due_K_.head(n_).setConstant(pulled_K_);
-    due_K_[sensor()] = pulled_K_;
-    const float ambient_K = static_cast<float>(trusted_ambient_degC_ - ambient_degC_);
+    due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
+    due_K_ = due_margin_K_ + Row::Constant(n_ + 5, heard_.pulled_K);
+    doubted_K_.setZero();
+    const float ambient_K = static_cast<float>(heard_.trusted_ambient_degC - ambient_degC_);
     due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
     due_steps_ = window_steps;
     p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
@@ -360,21 +392,23 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   Row shared = Row::Zero(n_ + 5);
   shared = p_.lazyProduct(seen);
   float expected_K2 = seen.dot(shared) + variance_K2;
-  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one.
+  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one. While the
+  // model cools a lag would make it read hotter, but so does a model that cools too fast, and that would be cold.
   const bool raises = late_K != 0.0f && innovation_K > 0.0f;
-  const float doubt = raises ? 1.0f - innovation_K / least_gate_K : 1.0f;
+  const float doubt = !raises ? 1.0f : late_K < 0.0f ? 0.0f : 1.0f - innovation_K / least_gate_K;
   const float lag_K = doubt > 0.0f ? doubt * (seen.dot(late_shared_K_) - late_K) : 0.0f;
   shared += late_shared_K_ * lag_K;
   expected_K2 += squared(lag_K);
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_ || (!acquired_ && innovation_K < 0.0f)) gain[ambient()] = 0.0f;  // the first reading did that
+  if (ambient_known_ || (!heard_.acquired && innovation_K < 0.0f))
+    gain[ambient()] = 0.0f;  // the first reading did that
   const float down_K = down_by(gain, innovation_K);
   if (down_K > most_down_K) gain *= most_down_K / down_K;
   if (std::isfinite(most_down_K)) {
-    const float pulled_K = pulled_K_ + down_by(gain, innovation_K);  // net: noise up and down cancels
-    pulled_K_ = pulled_K > 0.0f ? pulled_K : 0.0f;
+    const float pulled_K = heard_.pulled_K + down_by(gain, innovation_K);  // net: noise up and down cancels
+    heard_.pulled_K = pulled_K > 0.0f ? pulled_K : 0.0f;
   }
   // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
   // less heat. So a winding falls no further than it would follow.
@@ -455,7 +489,8 @@ HeatMemory CoreEstimator::save() const {
                     flags_ & housing_contradicts ? 1u : 0u,
                     late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
   for (int i = 0; i < n_; ++i) {
-    memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f);  // what is due now is so later
+    // What is due now is so later, and what is doubted not proven.
+    memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
     memory.sigma_K[i] = estimate_.sigma_K[i];
   }
   return memory;
@@ -488,15 +523,54 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   bool soaked = true;
   for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
+  remembers_ = memory.degC[housing_.node] > settings_.ambient_degC;  // or it was no warmer than its surroundings
   if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K) late_K_ = static_cast<double>(memory.late_K);
   if (soaked) soak();
   if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+  for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
+    const double saved = static_cast<double>(memory.degC[i]);
+    if (plausible(saved)) doubted_K_[i] = static_cast<float>(std::fmin(saved - degC_[i], 0.0));
+    if (remembers_) kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
+  }
   if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
     flags_ |= housing_contradicts;
-    acquired_ = true;
-    trusted_ambient_degC_ = ambient_degC_;
+    know_housing(sigma_K[housing_.node]);
+  }
+  publish();
+}
+
+/// As well as if its sensor had been heard for long.
+void CoreEstimator::know_housing(float sigma_K) {
+  const int h = housing_.node;
+  heard_.acquired = true;
+  heard_.trusted_ambient_degC = ambient_degC_;
+  p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K);
+}
+
+void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
+  const HeatMemory memory = save();
+  const HousingSensor<double> described = housing_;
+  const SensorRecord record = heard_;
+  const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
+  const double sensed = sensor_degC_ + std::fmax(static_cast<double>(due_K_[sensor()]), 0.0);
+  const std::uint32_t missing = flags_ & housing_missing;
+  new (this) CoreEstimator(set, settings);  // in place: too large for the stack
+  restore(memory, 0.0);
+  const bool same_sensor = memory.node_count == n_ && described.node == housing_.node &&
+                           described.lag_s == housing_.lag_s && described.offset_K == housing_.offset_K &&
+                           described.gain_error == housing_.gain_error;
+  if (!same_sensor) return;
+  heard_ = record;
+  flags_ |= missing;
+  if (record.acquired && memory.disbelieved == 0) {
     const int h = housing_.node;
-    p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K[h]);
+    degC_[h] = static_cast<double>(memory.degC[h] - doubted_K);  // not raised: what the sensor said of it stays said
+    doubted_K_[h] = doubted_K;
+    sensor_degC_ = sensed;
+    last_sensor_degC_ = static_cast<float>(sensed);
+    good_degC_ = degC_;
+    know_housing(memory.sigma_K[h]);
+    believe_ambient_below(static_cast<double>(memory.ambient_degC));  // it would show at once if that is too cold
   }
   publish();
 }
@@ -509,6 +583,7 @@ void CoreEstimator::start_hot() {
   for (float& s : sigma_K)
     s = settings_.margin_sigmas > 0.0f ? unknown_below_K / settings_.margin_sigmas : start_sigma_K;
   begin_anew(sigma_K);
+  guessed_ = true;
 }
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
@@ -527,13 +602,12 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  acquired_ = read_ = false;
-  met_ = 0;
+  heard_ = {};
   resumed_ = true;
   flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
+  remembers_ = guessed_ = false;
   due_steps_ = 0;
-  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
-  pulled_K_ = model_moved_K_ = hotter_K_ = 0.0f;
+  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
   late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
   widen_all();
   const int power = n_ + 2, inner = n_ + 3;
@@ -558,6 +632,10 @@ void CoreEstimator::guard_state() {
   bool sure = true;
   for (int i = 0; i < n_ + 5; ++i)
     sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f && std::abs(late_shared_K_[i]) < 1e3f;
+  for (int i = 0; i < n_ + 5; ++i) {
+    if (!(std::abs(doubted_K_[i]) < 1e3f)) doubted_K_[i] = most_sigma_K;
+    if (!(std::abs(kept_K_[i]) < 1e3f)) kept_K_[i] = 0.0f;
+  }
   if (!sure) widen_all();
   if (good) {
     good_degC_ = degC_;
@@ -573,7 +651,7 @@ void CoreEstimator::guard_state() {
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
   sensor_degC_ = sensed_degC(degC_[housing_.node]);
   last_sensor_degC_ = static_cast<float>(sensor_degC_);
-  model_moved_K_ = 0.0f;
+  heard_.model_moved_K = 0.0f;
   late_K_ = 0.0;
   due_steps_ = 0;
   due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
@@ -588,7 +666,7 @@ void CoreEstimator::publish() {
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
                                    : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
-                                         std::fmax(due_margin_K_[i], 0.0f);
+                                         std::fmax(due_margin_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
     estimate_.max_degC[i] = max_degC_[i];
   }
   estimate_.housing_degC = degC_[housing_.node];

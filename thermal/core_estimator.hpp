@@ -109,6 +109,9 @@ class CoreEstimator {
   /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise. After either of both a cold
   /// reading may come from a sensor that lags, and lowers as much as it cannot.
   void start_hot();
+  /// Another model takes over at once, as by restore(save(), 0) of a new one. Of a sensor that it describes as the last
+  /// one did nothing is forgotten: or one that stands still would be believed for a minute after each.
+  void replace(const HeatSet<double>& set, const EstimatorSettings& settings);
 
   const Estimate& estimate() const { return estimate_; }
   /// How much faster T + k sigma rises than T when heat is poured in.
@@ -134,6 +137,9 @@ class CoreEstimator {
   void hear_housing(Reading housing);
   void correct_by_housing(float reading_degC, float innovation_K, bool first);
   void meet_sensor(float reading_degC);
+  void doubt(float left_K);
+  void believe_ambient_below(double housing_degC);
+  void know_housing(float sigma_K);
   double sensed_degC(double housing_degC) const;
   double housing_of_degC(double sensed_degC) const;
   void disbelieve_housing();
@@ -168,19 +174,28 @@ class CoreEstimator {
   Row due_margin_K_;        // and what it has yet to take from the margins: surer at once, they would be colder at once
   int due_steps_ = 0;
   HeatInput<> input_;
+  // How much hotter the states would be had the first readings after a reset not lowered what was remembered. Counts as
+  // margin until the sensor proves that it lives: it may have come off, or sit on another motor.
+  Row doubted_K_;
+  Row kept_K_;  // how much hotter the nodes are than a housing that was off for long; no sensor has to show
+  bool remembers_ = false, guessed_ = false;  // since the reset: a warm motor; nothing
 
-  // The housing sensor's record.
-  double reading_sum_ = 0.0, sensor_sum_ = 0.0;
-  int window_ = 0, silent_ = 0, unheard_ = 0;  // steps: of readings in it, without one, since it was last full
-  bool acquired_ = false, read_ = false, ambient_known_ = false;
-  int met_ = 0;                        // readings that were believed without limit
-  bool resumed_ = false;               // after a reset: the sensor may lag behind what was remembered
-  double trusted_ambient_degC_ = 0.0;  // when the sensor last proved that it lives
-  float pulled_K_ = 0.0f;              // how far it has pulled the winding down lately
-  float hotter_K_ = 0.0f;              // what the next reading that is too hot counts for
-  float model_moved_K_ = 0.0f;         // how far the model says the housing moved in about two minutes,
-  float reading_slow_degC_ = 0.0f, reading_moved_K_ = 0.0f;  // and how far the reading did
+  double reading_sum_ = 0.0, sensor_sum_ = 0.0;  // of readings in this window
+  int window_ = 0;                               // steps of them
+  bool ambient_known_ = false;
+  bool resumed_ = false;  // after a reset: the sensor may lag behind what was remembered
   float last_sensor_degC_ = 0.0f;
+  /// The housing sensor's record: of the sensor, whatever the model is.
+  struct SensorRecord {
+    int silent = 0, unheard = 0;  // steps without a reading, since a window was last full
+    bool acquired = false, read = false;
+    int met = 0;                        // readings that were believed without limit
+    double trusted_ambient_degC = 0.0;  // when the sensor last proved that it lives
+    float pulled_K = 0.0f;              // how far it has pulled the winding down lately
+    float hotter_K = 0.0f;              // what the next reading that is too hot counts for
+    float model_moved_K = 0.0f;         // how far the model says the housing moved in about two minutes,
+    float reading_slow_degC = 0.0f, reading_moved_K = 0.0f;  // and how far the reading did
+  } heard_;
 
   std::uint32_t flags_ = 0;
   Estimate estimate_{};

@@ -81,10 +81,10 @@ TEST(ClosedLoop, TheLargeMotorIsSafeWhenBlockedOnTheLargeBoard) {
 }
 
 /// What both axes brake at once has to stay in the bus' own capacitors: the current loops take their time, so it passes
-/// the end of derating, but not the trip. (From some 1500 rad/s on it does, and the bridges open.)
+/// the end of derating, but not the trip. 1700 rad/s is nearly the fastest that 48 V can turn this motor.
 TEST(ClosedLoop, BothAxesBrakingOnASupplyThatTakesNothingBackDoNotTrip) {
   double highest_V = 0;
-  for (const double speed_rad_per_s : {600.0, 1200.0}) {
+  for (const double speed_rad_per_s : {600.0, 1200.0, 1600.0, 1700.0}) {
     Scene scene = boards::host::read_scene("jump", HOTCORE_SOURCE_DIR "/host-sim/scenes",
                                            {"motor=ec-powermax-30-48v", "seconds=0.6"});
     scene.supply_sinks = false;
@@ -106,7 +106,7 @@ TEST(ClosedLoop, BothAxesBrakingOnASupplyThatTakesNothingBackDoNotTrip) {
     }
   }
   RecordProperty("highest_V", std::to_string(highest_V));
-  EXPECT_GT(highest_V, 1.08 * 48) << "nothing was derated, so nothing was shown";
+  EXPECT_GT(highest_V, 1.13 * 48) << "nothing was derated, so nothing was shown";
   EXPECT_LT(highest_V, 58.0);
 }
 

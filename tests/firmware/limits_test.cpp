@@ -87,14 +87,14 @@ TEST(Permit, AThermalLaneThatIsSilentLeavesSixtyPercentOfContinuous) {
 }
 
 TEST(Permit, AHighBusTakesBrakingAndALowBusTakesDriving) {
-  // 48 V supply: braking from 51.84 to 55.68 V, driving from 36 down to 24 V.
+  // 48 V supply: braking from 50.88 to 54.24 V, driving from 36 down to 24 V.
   struct Row {
     float bus_V, q_A, rad_per_s, left_A;
     Limit reason;
   };
   const Row rows[] = {
-      {51.8f, -20.0f, 100.0f, 20.0f, Limit::none},      {53.76f, -20.0f, 100.0f, 10.0f, Limit::bus_high},
-      {53.76f, 20.0f, -100.0f, 10.0f, Limit::bus_high}, {53.76f, 20.0f, 100.0f, 20.0f, Limit::none},
+      {50.8f, -20.0f, 100.0f, 20.0f, Limit::none},      {52.56f, -20.0f, 100.0f, 10.0f, Limit::bus_high},
+      {52.56f, 20.0f, -100.0f, 10.0f, Limit::bus_high}, {52.56f, 20.0f, 100.0f, 20.0f, Limit::none},
       {56.0f, -20.0f, 100.0f, 0.0f, Limit::bus_high},   {30.0f, 20.0f, 100.0f, 10.0f, Limit::bus_low},
       {30.0f, -20.0f, 100.0f, 20.0f, Limit::none},      {30.0f, 20.0f, 0.0f, 10.0f, Limit::bus_low},
       {20.0f, 20.0f, 100.0f, 0.0f, Limit::bus_low},     {nan, 20.0f, 100.0f, 0.0f, Limit::bus_low},

@@ -273,6 +273,21 @@ TEST(Estimator, CoolingThatDiffersFromTheSheetIsTakenUpOrReadsHotNeverCold) {
   }
 }
 
+/// What it had learned of better cooling in a load is too much of it at rest. A reading that is hotter then may come
+/// from a sensor that lags; it is believed all the same.
+TEST(Estimator, AModelThatCoolsTooFastIsHeldByItsSensor) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    wire::Motor real = reference::ec16();
+    real.R2_K_per_W *= 0.7;
+    Bench bench(real, with(thermal::sheet_trust), 25, reference::ec16());
+    bench.seed.seed(seed);
+    for (int minute = 0; minute < 40; ++minute) {
+      bench.run(60, minute % 20 < 15 ? 5 : 0);
+      EXPECT_GT(bench.core_error_K(), -0.3) << minute << " min, seed " << seed;
+    }
+  }
+}
+
 TEST(Estimator, AMissingHousingIsFlaggedInATenthOfASecondAndNeverReadsAsCold) {
   for (Reading lie : {missing, Reading{-273.0f, true}, Reading{300.0f, true}, Reading{std::nanf(""), true}}) {
     Bench honest(reference::ec16(), with(thermal::sheet_trust), 25),
@@ -328,6 +343,34 @@ TEST(Estimator, AStuckOrDetachedSensorLowersTheEstimateByLessThanFiveKelvinAndIs
       EXPECT_LE(worst_K, 5.0);
       EXPECT_GT(flagged_s, 0);
       EXPECT_LE(flagged_s, 120);
+    }
+  }
+}
+
+/// A motor that rests cools, and so does a sensor that comes off it, only more.
+TEST(Estimator, ASensorThatComesOffACoolingMotorIsFound) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double falls_s : {5.0, 10.0, 30.0}) {
+      Bench b(reference::ec16(), with(trust), 30);
+      thermal::Governor governor({});
+      double allowed_A = 0, sensed_degC = 30, hottest_degC = 0;
+      const auto run = [&](double seconds, double asked_A, bool on) {
+        for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
+          b.run(0.01, std::pow(std::min(asked_A, allowed_A), 2), [&] {
+            sensed_degC =
+                on ? static_cast<double>(b.honest().value) : sensed_degC + (30 - sensed_degC) * 0.01 / falls_s;
+            return Reading{static_cast<float>(sensed_degC), true};
+          });
+          allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+          hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+        }
+      };
+      run(300, 20, true);
+      run(60, 0, true);
+      run(60, 0, false);
+      EXPECT_TRUE(b.flag(thermal::housing_contradicts)) << falls_s << " s";
+      run(200, 20, false);
+      EXPECT_LE(hottest_degC, 155 + 3) << falls_s << " s";
     }
   }
 }
@@ -680,6 +723,18 @@ TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
   EXPECT_GE(core.estimate().hottest_degC(), 40.0) << "10 K below the limit would be 35";
 }
 
+/// A motor that cools slowly to its ambient: nothing but the start moved the model, and that is no movement.
+TEST(Estimator, AStartIsNoMovementThatASensorWouldHaveToFollow) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    Bench b(reference::ec16(), with(trust), 25);
+    b.plant.degC = {30, 30};
+    for (int s = 0; s < 600; ++s) {
+      b.run(1, 0);
+      ASSERT_FALSE(b.flag(thermal::housing_contradicts)) << s << " s";
+    }
+  }
+}
+
 TEST(Estimator, TheHousingProvesAfterAResetThatTheMotorIsCold) {
   const auto set = thermal::three_phase_set(reference::ec16());
   CoreEstimator core(set, {});
@@ -722,6 +777,156 @@ TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAResetForBeingLessWrong)
     ASSERT_TRUE(again.estimate().flags & thermal::housing_contradicts);
   }
   EXPECT_GE(again.estimate().housing_degC, before_degC);
+}
+
+/// A model that is written while a motor works, again and again, makes a sensor that stands still no better than it is.
+TEST(Estimator, ASensorThatStandsStillIsNotBelievedAnewWithEachModel) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double every_s : {3.0, 8.0, 30.0}) {
+      Bench b(reference::ec16(), with(trust), 25);
+      b.run(120, 1);
+      const Reading stuck = b.honest();
+      thermal::Governor governor({});
+      double allowed_A = 0, hottest_degC = 0, next_s = every_s;
+      for (int i = 0; i < 40000; ++i) {
+        b.run(0.01, allowed_A * allowed_A, [&] { return stuck; });
+        allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+        hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+        ASSERT_LT(hottest_degC, 155 + 3) << "a model each " << every_s << " s, after " << i / 100 << " s";
+        if (i * 0.01 < next_s) continue;
+        next_s += every_s;
+        b.core.replace(thermal::three_phase_set(b.m), with(trust));
+      }
+      EXPECT_TRUE(b.flag(thermal::housing_contradicts));
+      EXPECT_GT(hottest_degC, 125) << "the limit was never near, so nothing was shown";
+    }
+  }
+}
+
+/// In a room of 25 degC, and when it has been at work; what the sensor said before stays said.
+TEST(Estimator, AnHonestSensorIsBelievedAsMuchByTheNextModel) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const double i2_A2 : {0.0, 5.0}) {
+      Bench b(reference::ec16(), with(trust), 25), same(reference::ec16(), with(trust), 25);
+      for (int minute = 0; minute < 20; ++minute) {
+        for (Bench* one : {&b, &same}) one->run(60, minute % 4 == 3 ? 0 : i2_A2);
+        EXPECT_FALSE(b.flag(thermal::housing_contradicts)) << minute << " min";
+        EXPECT_NEAR(b.core.estimate().hottest_degC(), same.core.estimate().hottest_degC(), 3.0) << minute << " min";
+        b.core.replace(thermal::three_phase_set(b.m), with(trust));
+      }
+    }
+  }
+}
+
+/// Told that its sensor reads 10 K too much, a model believes it again as at a start.
+TEST(Estimator, ASensorThatIsDescribedAnewIsHeardAnew) {
+  Bench b(reference::ec16(), with(thermal::identified_trust), 25);
+  const auto high = [&] { return Reading{b.honest().value + 10, true}; };
+  b.run(120, 1, high);
+  auto set = thermal::three_phase_set(b.m);
+  set.housing.offset_K = 10;
+  b.core.replace(set, with(thermal::identified_trust));
+  b.run(60, 1, high);
+  EXPECT_FALSE(b.flag(thermal::housing_contradicts));
+  EXPECT_NEAR(b.core.estimate().housing_degC, static_cast<double>(b.plant.degC[1]), 1.0);
+}
+
+/// A motor that has worked at its limit for some minutes, and a reset of which nobody knows how long it took.
+struct Restarted {
+  Bench b;
+  thermal::Governor governor;
+  double most_A, allowed_A = 0, A2s = 0, hottest_degC = 0;
+
+  Restarted(const wire::Motor& m, float most, thermal::Trust trust, bool cooled, bool remembered = true)
+      : b(m, with(trust), 25), governor(settings(most)), most_A(static_cast<double>(most)) {
+    for (int i = 0; remembered && i < 20; ++i) {
+      run(10, most_A, [this] { return b.honest(); });
+      run(10, 0, [this] { return b.honest(); });
+    }
+    const thermal::HeatMemory memory = remembered ? b.core.save() : thermal::HeatMemory{4, {25, 25, 25, 25}, {}, 25};
+    if (cooled) b.plant.degC = {25, 25};
+    b.core = CoreEstimator(thermal::three_phase_set(m), with(trust));
+    b.core.restore(memory, -1);
+    governor = thermal::Governor(settings(most));
+    A2s = hottest_degC = 0;
+  }
+  static thermal::GovernorSettings settings(float most_A) {
+    thermal::GovernorSettings s;
+    s.max_A = most_A;
+    return s;
+  }
+  template <class Sensor>
+  void run(double seconds, double asked_A, Sensor sensor) {
+    for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
+      const double i2_A2 = std::pow(std::min(asked_A, allowed_A), 2);
+      b.run(0.01, i2_A2, sensor);
+      allowed_A = static_cast<double>(governor.tick(b.core).current_A);
+      A2s += i2_A2 * 0.01;
+      hottest_degC = std::max(hottest_degC, static_cast<double>(b.plant.degC[0]));
+    }
+  }
+};
+
+TEST(Estimator, ASensorThatCameOffDuringAResetLetsNoWindingPassItsLimit) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      for (const double rest_s : {0.6, 30.0}) {
+        Restarted hot(m, most_A, trust, false);
+        const auto room = [&] { return Reading{25.0f + static_cast<float>(hot.b.noise(hot.b.seed)), true}; };
+        hot.run(rest_s, 0, room);
+        for (int i = 0; i < 20; ++i) {
+          hot.run(20, hot.most_A, room);
+          hot.run(10, 0, room);
+        }
+        EXPECT_LE(hot.hottest_degC, 155 + 3) << "R1 " << m.R1_K_per_W << ", after " << rest_s << " s";
+        EXPECT_TRUE(hot.b.flag(thermal::housing_contradicts));
+      }
+    }
+  }
+}
+
+/// What the memory of a hot motor costs one that has cooled meanwhile: until its housing has followed a load by 3 K.
+TEST(Estimator, AMotorThatHasCooledDuringAResetIsBelievedWithinAMinuteOfLoad) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      Restarted cooled(m, most_A, trust, true), cold(m, most_A, trust, true, false);
+      for (Restarted* one : {&cooled, &cold}) {
+        const auto honest = [one] { return one->b.honest(); };
+        one->run(60, one->most_A, honest);
+        one->run(10, 0, honest);
+        one->A2s = 0;
+        one->run(60, one->most_A, honest);
+        EXPECT_FALSE(one->b.flag(thermal::housing_contradicts));
+        EXPECT_LE(one->hottest_degC, 155 + 3);
+      }
+      EXPECT_GE(cooled.A2s, 0.95 * cold.A2s) << "R1 " << m.R1_K_per_W;
+    }
+  }
+}
+
+/// A cold motor that begins without a memory and is loaded at once.
+TEST(Estimator, AStartThatIsTooHotDoesNotContradictAnHonestSensor) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      Restarted unknown(m, most_A, trust, true, false), cold(m, most_A, trust, true, false);
+      unknown.b.core.start_hot();
+      for (Restarted* one : {&unknown, &cold}) {
+        const auto honest = [one] { return one->b.honest(); };
+        for (int i = 0; i < 4; ++i) {
+          one->run(20, one->most_A, honest);
+          one->run(10, 0, honest);
+        }
+        one->A2s = 0;
+        for (int i = 0; i < 10; ++i) {
+          one->run(20, one->most_A, honest);
+          one->run(10, 0, honest);
+        }
+        EXPECT_FALSE(one->b.flag(thermal::housing_contradicts));
+        EXPECT_LE(one->hottest_degC, 155 + 3);
+      }
+      EXPECT_GE(unknown.A2s, 0.95 * cold.A2s) << "R1 " << m.R1_K_per_W;
+    }
+  }
 }
 
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
