@@ -239,7 +239,7 @@ TEST(SlowBadInput, ACurrentThatIsReadTooSmall) {
        "a current that is read 2.7 times too small; see the current's unit");
 }
 
-TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
+TEST(SlowBadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
   // The load that a later clock would have moved away with the readings that it had moved.
   tests::BenchOptions warm;
   warm.seconds = 2600, warm.rate_Hz = 0.5;
@@ -260,7 +260,7 @@ TEST(BadInput, AStepSoonAfterALogBeganWarmIsNoSecondClock) {
   says(report.sentence, "natural_convection");
 }
 
-TEST(BadInput, AMassThatIsStillColdWhereALogBeginsSoonAfterItsMotorIsNoSecondCause) {
+TEST(SlowBadInput, AMassThatIsStillColdWhereALogBeginsSoonAfterItsMotorIsNoSecondCause) {
   // A frame that takes minutes has hardly warmed while the housing rose by 20 K: behind by nearly all of it.
   tests::BenchOptions soon;
   soon.seconds = 960, soon.rate_Hz = 2;
@@ -304,7 +304,7 @@ TEST(BadInput, HowFarAWindingMovesBetweenTheRowsOfATableIsNoNoise) {
   EXPECT_NE(wrong.verdict, identify::Verdict::adequate) << wrong.sentence;
 }
 
-TEST(BadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
+TEST(SlowBadInput, AHousingCooledAsByNoFlangeIsAskedForItsSensor) {
   const auto no_core = [](auto& row, int i) {
     if (i > 0) row[5] = "";
     return true;

@@ -275,7 +275,7 @@ TEST(Estimator, CoolingThatDiffersFromTheSheetIsTakenUpOrReadsHotNeverCold) {
 
 /// What it had learned of better cooling in a load is too much of it at rest. A reading that is hotter then may come
 /// from a sensor that lags; it is believed all the same.
-TEST(Estimator, AModelThatCoolsTooFastIsHeldByItsSensor) {
+TEST(SlowEstimator, AModelThatCoolsTooFastIsHeldByItsSensor) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     wire::Motor real = reference::ec16();
     real.R2_K_per_W *= 0.7;
@@ -804,7 +804,7 @@ TEST(Estimator, ASensorThatStandsStillIsNotBelievedAnewWithEachModel) {
 }
 
 /// In a room of 25 degC, and when it has been at work; what the sensor said before stays said.
-TEST(Estimator, AnHonestSensorIsBelievedAsMuchByTheNextModel) {
+TEST(SlowEstimator, AnHonestSensorIsBelievedAsMuchByTheNextModel) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     for (const double i2_A2 : {0.0, 5.0}) {
       Bench b(reference::ec16(), with(trust), 25), same(reference::ec16(), with(trust), 25);
