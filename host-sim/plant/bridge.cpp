@@ -188,12 +188,21 @@ void Bridge::switched(Motor& motor, const std::array<double, 3>& ratio, double b
 }
 
 /// A stretch with constant gates. Where both switches of a phase are off its current chooses the diode; a diode whose
-/// current reaches zero stops, and a floating lead that leaves the rails starts one.
+/// current reaches zero stops, and a floating lead that leaves the rails starts one, unless that would carry backwards
+/// at once. All of the stretch passes: what a shaft that others turn does meanwhile would come as one jump of flux.
 void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates, double bus_V,
                      const std::array<double, 3>& winding_ohm) {
+  constexpr int most_splits = 13;  // each phase may stop and start a diode, and one that starts may be refused
+  constexpr double nothing_A = 1e-3;
+  const bool driven = std::any_of(gates.begin(), gates.end(), [](Gate gate) { return gate != Gate::off; });
+  unsigned refused = 0;  // that start at no current and would carry backwards
   double left_s = h_s;
-  for (int split = 0; split < 7 && left_s > 0; ++split) {  // each phase can stop and start a diode once; then go on
+  for (int split = 1; left_s > 0; ++split) {
     const std::array<double, 3> current_A = motor.current_A();
+    const bool rests =
+        std::all_of(current_A.begin(), current_A.end(), [](double i_A) { return std::fabs(i_A) < nothing_A; });
+    // Diodes that the back-EMF just reaches open and close without end: then none of them carries.
+    if (split == most_splits && !driven && rests) return motor.step(left_s, {0, 0, 0}, 7, false);
     std::array<double, 3> terminal_V{};
     std::array<bool, 3> at_upper{};
     std::array<int, 3> diode{};  // +1 upper, -1 lower, 0 none
@@ -223,6 +232,7 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
     };
     settle();
     if (open != 0) {
+      const unsigned never = open_phases | refused;
       const std::array<double, 3> emf_V = motor.back_emf_V();
       double star_V = 0;
       int closed = 0;
@@ -234,7 +244,7 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
       if (closed == 0) {
         const auto highest = static_cast<int>(std::max_element(emf_V.begin(), emf_V.end()) - emf_V.begin());
         const auto lowest = static_cast<int>(std::min_element(emf_V.begin(), emf_V.end()) - emf_V.begin());
-        const bool can = !((open_phases >> highest & 1) || (open_phases >> lowest & 1));
+        const bool can = !((never >> highest & 1) || (never >> lowest & 1));
         if (can && emf_V[highest] - emf_V[lowest] > bus_V + 2 * design_.diode_V) {
           close(highest, 1);
           close(lowest, -1);
@@ -242,7 +252,7 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
       } else {
         star_V /= closed;
         for (int k = 0; k < 3; ++k) {
-          if (!(open >> k & 1) || (open_phases >> k & 1)) continue;
+          if (!(open >> k & 1) || (never >> k & 1)) continue;
           const double lead_V = star_V + emf_V[k];
           if (lead_V > bus_V + design_.diode_V) close(k, 1);
           if (lead_V < -design_.diode_V) close(k, -1);
@@ -258,14 +268,22 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
     const std::array<double, 3> after_A = motor.current_A();
     int stopped = -1;
     double share = 1;
-    for (int k = 0; k < 3; ++k) {
+    unsigned backwards = 0;
+    for (int k = 0; k < 3 && split < most_splits; ++k) {
       if (diode[k] == 0 || after_A[k] * diode[k] <= 0) continue;  // still flows its way
-      const double here = std::fabs(current_A[k]) <= 1e-9 ? 0 : current_A[k] / (current_A[k] - after_A[k]);
+      if (std::fabs(current_A[k]) <= 1e-9) backwards |= 1u << k;
+      const double here = current_A[k] / (current_A[k] - after_A[k]);
       if (here < share) {
         share = here;
         stopped = k;
       }
     }
+    if (backwards != 0) {
+      motor.restore(before);
+      refused |= backwards;
+      continue;
+    }
+    refused = 0;
     if (stopped >= 0) {
       motor.restore(before);
       step_s = std::max(share * left_s, 1e-12);
@@ -287,12 +305,6 @@ void Bridge::segment(Motor& motor, double h_s, const std::array<Gate, 3>& gates,
     left_s -= step_s;
     if (left_s < 1e-12) return;
   }
-  // Diodes that the back-EMF just reaches open and close without end: then none of them carries, and time goes on.
-  constexpr double nothing_A = 1e-3;
-  const std::array<double, 3> rest_A = motor.current_A();
-  const bool driven = std::any_of(gates.begin(), gates.end(), [](Gate gate) { return gate != Gate::off; });
-  const bool rests = std::all_of(rest_A.begin(), rest_A.end(), [](double i_A) { return std::fabs(i_A) < nothing_A; });
-  if (!driven && rests) motor.step(left_s, {0, 0, 0}, 7, false);
 }
 
 void Bridge::charge_ripple(int phase, double squared_A2s, double winding_ohm) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "host-sim/plant/supply.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
 
@@ -237,6 +239,25 @@ TEST(Bridge, AReleasedMotorTurnsOnAtEverySpeed) {
   }
   EXPECT_GT(rectifying, 10);
   EXPECT_GT(quiet, 10);
+}
+
+/// Also where a third lead just reaches its diode while the current in the other two ends.
+TEST(Bridge, AReleasedMotorTurnsOnWhateverCurrentItHad) {
+  std::mt19937_64 seed(1);
+  std::uniform_real_distribution<double> speed(1900, 2200);  // back-EMF peaks of a third of the bus and of two diodes
+  std::uniform_real_distribution<float> ratio(0.4f, 0.6f);
+  std::uniform_int_distribution<int> length(1, 60);
+  for (int n = 0; n < 4000; ++n) {
+    Locked bench(host_sim::motor_from_sheet(plant_tests::small_motor()), BridgeDesign{});
+    bench.motor.load.mode = Load::Mode::imposed_speed;
+    bench.motor.load.speed_rad_per_s = speed(seed);
+    const int driven = length(seed), off = 20;
+    bench.run({{ratio(seed), ratio(seed), ratio(seed)}, true}, 24, driven);
+    bench.run({{0, 0, 0}, false}, 24, off);
+    EXPECT_EQ(bench.motor.current_squared_A2(), 0) << n;
+    const double turned_rad = bench.motor.angle_rad() + 2 * host_sim::pi * static_cast<double>(bench.motor.turns());
+    ASSERT_NEAR(turned_rad, bench.motor.load.speed_rad_per_s * (driven + off) * period_s, 1e-6) << n;
+  }
 }
 
 TEST(Supply, ANonSinkingSupplyRisesByExactlyTheReturnedEnergy) {
