@@ -100,7 +100,7 @@ void Axis::take_over() {
     return;
   }
   guard_ = Guard(rating_);
-  rotor_ = Rotor(p, rating_);
+  rotor_ = Rotor(p, rating_, rotor_);
   setpoint_.configure(p, rating_);
   permit_ = Permit(p, rating_);
   current_loop_ = CurrentLoop(p, rating_);
@@ -182,7 +182,10 @@ hal::Duty Axis::unseen(const hal::AxisSample& sample, Verdict verdict) {
   }
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
-  if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) return last_;
+  if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) {
+    last_.on = last_.on && mode_ == Mode::running;  // a command may just have ended that
+    return last_;
+  }
   if (mode_ == Mode::ready || mode_ == Mode::running) return trip(guard_.found());
   return last_ = released;
 }
@@ -464,7 +467,7 @@ void Axis::publish() {
     if (winding < 3) state.core_degC[winding++] = degC;
     if (!(degC <= hottest_degC)) {
       hottest_degC = degC;
-      state.core_sigma_K = now.sigma_K[i];
+      state.core_sigma_K = core_.counted_sigma_K(i);
     }
   }
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];

@@ -71,7 +71,7 @@ struct AxisState {
   Mode mode = Mode::off;
   FastView fast{};
   float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
-  float core_sigma_K = 0.0f;              // of the hottest
+  float core_sigma_K = 0.0f;              // of the hottest, with what is doubted: core + k sigma is what is limited
   float housing_degC = 0.0f;              // estimated
   thermal::Unseen unseen{};               // of the last 10 ms: what their samples did not show
   float heating_A = 0.0f;                 // direct, through two terminals: heats as the phases did, ripple included

@@ -400,6 +400,45 @@ TEST_F(Running, DisarmOpensTheBridgeAtTheNextTick) {
   EXPECT_EQ(axis().mode(), Mode::off);
 }
 
+/// A bridged sample goes on as it was only where what went on still may.
+TEST_F(Running, DisarmOpensTheBridgeAtTheNextTickAlsoWithoutASample) {
+  axis().disarm();
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::off);
+}
+
+TEST_F(Running, WhatAllowsNothingOpensTheBridgeAtTheNextTickAlsoWithoutASample) {
+  run(200 - ticks % 200);
+  driver.slow_tick({{150.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  ASSERT_EQ(axis().state().allowance_A, 0.0f);
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::ready);
+}
+
+/// The speed is not a parameter: without it the voltage would be aimed and fed forward as at standstill.
+TEST_F(Running, AnotherSetDoesNotForgetHowFastTheRotorTurns) {
+  motor.rad_per_s = 600.0;
+  hold({0.0f, 0.0f}, 1000);
+  axis().disarm();
+  run(2);
+  driver.configure(0, bench::driver_setup().axes[0], firmware::HeatModel::unchanged);
+  ASSERT_EQ(axis().arm(), Status::done);
+  run(1);
+  driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  ASSERT_EQ(axis().mode(), Mode::ready);
+  EXPECT_NEAR(axis().fast().rad_per_s, 600.0f, 6.0f);
+  double worst_A = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+    run(1);
+    worst_A = std::max(worst_A, std::abs(motor.iq_A));
+  }
+  EXPECT_EQ(axis().mode(), Mode::running);
+  EXPECT_LT(worst_A, 0.5) << "as after any restart";
+}
+
 TEST(Axis, WhileOffABadSampleOnlyKeepsItFromArming) {
   Rig rig;
   rig.motor.bus_V = 5.0;
