@@ -314,10 +314,14 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   const HeatSums sums = heat_.take();
   input_ = heat_input(sums);
   // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
-  owed_steps_ += static_cast<float>(sums.periods) * period_s_ * slow_Hz;
+  const float came_steps = static_cast<float>(sums.periods) * period_s_ * slow_Hz;
+  owed_steps_ += came_steps;
   steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
+  // Its heat does not wait, or it would be that of the next. A lane that comes too often is charged for whole steps.
+  charge_ = owed_steps_ < 0.5f ? 1.0f : came_steps / static_cast<float>(steps_);
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
-  core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps_ - 1);
+  core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
+             steps_ - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
@@ -429,6 +433,16 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   input[thermal::Boundary::coolant] = around_degC;
   input[thermal::Boundary::frame] = around_degC;
   input[thermal::Boundary::neighbour] = around_degC;
+  return input;
+}
+
+/// What the whole steps that stand for it are charged with.
+thermal::HeatInput<> Axis::charged(thermal::HeatInput<> input) const {
+  const double charge = static_cast<double>(charge_);
+  for (int k = 0; k < thermal::drive_count; ++k) {
+    const auto drive = static_cast<thermal::Drive>(k);
+    if (thermal::is_current_square(drive) || drive == thermal::Drive::current2_speed2) input.drive[k] *= charge;
+  }
   return input;
 }
 
