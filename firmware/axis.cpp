@@ -100,7 +100,7 @@ void Axis::take_over() {
     return;
   }
   guard_ = Guard(rating_);
-  rotor_ = Rotor(p, rating_);
+  rotor_ = Rotor(p, rating_, rotor_);
   setpoint_.configure(p, rating_);
   permit_ = Permit(p, rating_);
   current_loop_ = CurrentLoop(p, rating_);
@@ -182,7 +182,10 @@ hal::Duty Axis::unseen(const hal::AxisSample& sample, Verdict verdict) {
   }
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
-  if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) return last_;
+  if (verdict == Verdict::bridged && guard_.passes(last_.ratio)) {
+    last_.on = last_.on && mode_ == Mode::running;  // a command may just have ended that
+    return last_;
+  }
   if (mode_ == Mode::ready || mode_ == Mode::running) return trip(guard_.found());
   return last_ = released;
 }
@@ -311,10 +314,14 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) 
   const HeatSums sums = heat_.take();
   input_ = heat_input(sums);
   // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
-  owed_steps_ += static_cast<float>(sums.periods) * period_s_ * slow_Hz;
+  const float came_steps = static_cast<float>(sums.periods) * period_s_ * slow_Hz;
+  owed_steps_ += came_steps;
   steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
+  // Its heat does not wait, or it would be that of the next. A lane that comes too often is charged for whole steps.
+  charge_ = owed_steps_ < 0.5f ? 1.0f : came_steps / static_cast<float>(steps_);
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
-  core_.tick(input_, {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false}, steps_ - 1);
+  core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
+             steps_ - 1);
   allowance_ = permitted_by(governor_.tick(core_), board);
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
@@ -429,6 +436,16 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   return input;
 }
 
+/// What the whole steps that stand for it are charged with.
+thermal::HeatInput<> Axis::charged(thermal::HeatInput<> input) const {
+  const double charge = static_cast<double>(charge_);
+  for (int k = 0; k < thermal::drive_count; ++k) {
+    const auto drive = static_cast<thermal::Drive>(k);
+    if (thermal::is_current_square(drive) || drive == thermal::Drive::current2_speed2) input.drive[k] *= charge;
+  }
+  return input;
+}
+
 /// The smallest of core, board, and what is left without a housing reading; NaN allows nothing.
 Allowance Axis::permitted_by(const thermal::Allowance& core, const Allowance& board) {
   const bool blind = senses_housing_ && (core_.estimate().flags & thermal::housing_missing) != 0;
@@ -464,7 +481,7 @@ void Axis::publish() {
     if (winding < 3) state.core_degC[winding++] = degC;
     if (!(degC <= hottest_degC)) {
       hottest_degC = degC;
-      state.core_sigma_K = now.sigma_K[i];
+      state.core_sigma_K = core_.counted_sigma_K(i);
     }
   }
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];

@@ -71,7 +71,7 @@ struct AxisState {
   Mode mode = Mode::off;
   FastView fast{};
   float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
-  float core_sigma_K = 0.0f;              // of the hottest
+  float core_sigma_K = 0.0f;              // of the hottest, with what is doubted: core + k sigma is what is limited
   float housing_degC = 0.0f;              // estimated
   thermal::Unseen unseen{};               // of the last 10 ms: what their samples did not show
   float heating_A = 0.0f;                 // direct, through two terminals: heats as the phases did, ripple included
@@ -165,8 +165,9 @@ class Axis {
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
   const thermal::CoreEstimator& core() const { return core_; }
-  /// Mean of |i|^2 over the last slow tick, ripple included: what heats the power stage; for how many steps of 10 ms.
-  double current2_A2() const { return input_[thermal::Drive::current_A2]; }
+  /// Mean of |i|^2 over the steps of 10 ms that the last slow tick stood for, ripple included: what heats the power
+  /// stage; how many they are.
+  double current2_A2() const { return input_[thermal::Drive::current_A2] * static_cast<double>(charge_); }
   int elapsed_steps() const { return steps_; }
 
  private:
@@ -186,6 +187,7 @@ class Axis {
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
+  thermal::HeatInput<> charged(thermal::HeatInput<> input) const;
   thermal::Unseen unseen_now() const;
   thermal::Unseen take_unseen();
   float warm_ohm() const;
@@ -254,6 +256,7 @@ class Axis {
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
   float owed_steps_ = 0.0f;       // time that is not yet a whole one
   int steps_ = 1;                 // that the last slow tick stood for
+  float charge_ = 1.0f;           // time that really came, of these
   float phase_ohm_ = 0.0f, copper_per_K_ = 0.0f, flux_Wb_ = 0.0f, inductance_H_ = 1.0f, pwm_Hz_ = 0.0f;
   float peak_A_, blind_A_;  // what a missing housing reading leaves in the end,
   float blind_cap_A_;       // and what it leaves now

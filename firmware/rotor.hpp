@@ -40,6 +40,12 @@ class Rotor {
     max_rad_per_s_ = 0.5f * pi * rating.pwm_Hz / p.pole_pairs_count;
   }
 
+  /// With other parameters the rotor turns as fast as it did.
+  Rotor(const AxisParameters& p, const BoardRating& rating, const Rotor& last) : Rotor(p, rating) {
+    tracked_ = last.tracked_;
+    rad_per_s_ = within(last.rad_per_s_, max_rad_per_s_) ? last.rad_per_s_ : 0.0f;
+  }
+
   /// mechanical_rad within [0, 2 pi].
   RotorAngle follow(float mechanical_rad, std::uint32_t periods) {
     const std::uint32_t measured = quarters_of(mechanical_rad);

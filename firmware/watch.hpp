@@ -35,19 +35,21 @@ class Watch {
 
   void forget() { *this = {}; }
 
-  /// Fault::none unless it is beyond doubt. The axis is the caller's to fill in.
+  /// Fault::none unless it is beyond doubt, and never by a look that agrees. The axis is the caller's to fill in.
   FaultRecord judge(const Look& look, const Motor& motor) {
     const float read_A[3] = {look.phase_A.a, look.phase_A.b, look.phase_A.c};
     const float sum_A = read_A[0] + read_A[1] + read_A[2];
     const float most_A = std::fmax(std::fabs(read_A[0]), std::fmax(std::fabs(read_A[1]), std::fabs(read_A[2])));
     const float sum_bound_A = sum_free_A + sum_share * most_A;
-    sum_doubt_ = grown(sum_doubt_, within(sum_A, sum_bound_A) ? 0 : 2);
-    if (sum_doubt_ >= sum_beyond) return {wire::Fault::current_sum, 0, sum_A, sum_bound_A, 0.0f};
+    const bool has_none = within(sum_A, sum_bound_A);
+    sum_doubt_ = grown(sum_doubt_, has_none ? 0 : 2);
+    if (!has_none && sum_doubt_ >= sum_beyond) return {wire::Fault::current_sum, 0, sum_A, sum_bound_A, 0.0f};
 
     if (!look.switches) return {};
     const float left_V = unexplained_V(look, motor), bound_V = answer_bound_V(look, motor);
-    answer_doubt_ = grown(answer_doubt_, left_V <= bound_V ? 0 : left_V <= 2.0f * bound_V ? 1 : 2);
-    if (answer_doubt_ >= answer_beyond) return {wire::Fault::motor_differs, 0, left_V, bound_V, 0.0f};
+    const bool answers = left_V <= bound_V;
+    answer_doubt_ = grown(answer_doubt_, answers ? 0 : left_V <= 2.0f * bound_V ? 1 : 2);
+    if (!answers && answer_doubt_ >= answer_beyond) return {wire::Fault::motor_differs, 0, left_V, bound_V, 0.0f};
     return {};
   }
 

@@ -666,7 +666,7 @@ void CoreEstimator::publish() {
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
                                    : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
-                                         std::fmax(due_margin_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
+                                         due_above_K(i) + doubt_above_K(i);
     estimate_.max_degC[i] = max_degC_[i];
   }
   estimate_.housing_degC = degC_[housing_.node];

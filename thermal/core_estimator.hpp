@@ -114,6 +114,11 @@ class CoreEstimator {
   void replace(const HeatSet<double>& set, const EstimatorSettings& settings);
 
   const Estimate& estimate() const { return estimate_; }
+  /// All that the governor adds to a node, as a sigma of it: what is doubted after a reset counts as much as k sigma.
+  float counted_sigma_K(int node) const {
+    const float k = settings_.margin_sigmas, sigma_K = estimate_.sigma_K[node];
+    return k > 0.0f ? sigma_K + (due_above_K(node) + doubt_above_K(node)) / k : sigma_K;
+  }
   /// How much faster T + k sigma rises than T when heat is poured in.
   float burst_margin() const { return 1.0f + settings_.margin_sigmas * settings_.trust.power; }
   const HeatNetwork<double>& network() const { return network_; }
@@ -150,6 +155,8 @@ class CoreEstimator {
   float down_by(const Row& gain, float innovation_K) const;
   void guard_state();
   void publish();
+  float due_above_K(int node) const { return due_margin_K_[node] > 0.0f ? due_margin_K_[node] : 0.0f; }
+  float doubt_above_K(int node) const { return doubted_K_[node] > 0.0f ? doubted_K_[node] : 0.0f; }
 
   // Indices behind the nodes: ambient, sensor, errors of power, inner links, outer links.
   int ambient() const { return n_; }

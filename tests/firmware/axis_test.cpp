@@ -400,6 +400,45 @@ TEST_F(Running, DisarmOpensTheBridgeAtTheNextTick) {
   EXPECT_EQ(axis().mode(), Mode::off);
 }
 
+/// A bridged sample goes on as it was only where what went on still may.
+TEST_F(Running, DisarmOpensTheBridgeAtTheNextTickAlsoWithoutASample) {
+  axis().disarm();
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::off);
+}
+
+TEST_F(Running, WhatAllowsNothingOpensTheBridgeAtTheNextTickAlsoWithoutASample) {
+  run(200 - ticks % 200);
+  driver.slow_tick({{150.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  ASSERT_EQ(axis().state().allowance_A, 0.0f);
+  spoilt([](auto& s) { s.valid = false; });
+  EXPECT_FALSE(duty.on);
+  EXPECT_EQ(axis().mode(), Mode::ready);
+}
+
+/// The speed is not a parameter: without it the voltage would be aimed and fed forward as at standstill.
+TEST_F(Running, AnotherSetDoesNotForgetHowFastTheRotorTurns) {
+  motor.rad_per_s = 600.0;
+  hold({0.0f, 0.0f}, 1000);
+  axis().disarm();
+  run(2);
+  driver.configure(0, bench::driver_setup().axes[0], firmware::HeatModel::unchanged);
+  ASSERT_EQ(axis().arm(), Status::done);
+  run(1);
+  driver.slow_tick({{25.0f, true}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  ASSERT_EQ(axis().mode(), Mode::ready);
+  EXPECT_NEAR(axis().fast().rad_per_s, 600.0f, 6.0f);
+  double worst_A = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(axis().set_current({0.0f, 0.0f}), Status::done);
+    run(1);
+    worst_A = std::max(worst_A, std::abs(motor.iq_A));
+  }
+  EXPECT_EQ(axis().mode(), Mode::running);
+  EXPECT_LT(worst_A, 0.5) << "as after any restart";
+}
+
 TEST(Axis, WhileOffABadSampleOnlyKeepsItFromArming) {
   Rig rig;
   rig.motor.bus_V = 5.0;
@@ -835,6 +874,33 @@ double rise_of_bursts_K(bool on_time) {
 
 TEST(Axis, ASlowLaneThatIsLateWhileItGetsHotLosesNoHeat) {
   EXPECT_GT(rise_of_bursts_K(false), 0.98 * rise_of_bursts_K(true));
+}
+
+/// 3 s of a slow lane that needs a little more than a step and a half, a little less, and so on: rounded to two steps
+/// and to one. A current flows whenever it needs more, or whenever it needs less.
+std::unique_ptr<firmware::Driver> after_bursts_in_step(bool on_time, bool in_the_longer) {
+  auto driver = std::make_unique<firmware::Driver>(bench::driver_setup());
+  std::uint32_t sequence = bench::bring_up(driver->axis(0));
+  driver->axis(0).disarm();
+  for (int i = 0; i < 60000; ++i) {
+    hal::AxisSample sample = bench::quiet_sample(sequence++);
+    const int in_cycle = i % 600;
+    if ((in_cycle < 310) == in_the_longer) sample.current_A = {10, -5, -5};
+    (void)driver->axis(0).tick(sample);
+    if (on_time ? in_cycle % 200 == 199 : in_cycle == 309 || in_cycle == 599)
+      driver->slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+  }
+  return driver;
+}
+
+TEST(Axis, ASlowLaneThatIsLateInStepWithTheCurrentLosesNoHeat) {
+  const auto rise_K = [](const firmware::Driver& d) { return d.axis(0).core().estimate().hottest_degC() - 25; };
+  for (const bool in_the_longer : {false, true}) {
+    const auto late = after_bursts_in_step(false, in_the_longer), on_time = after_bursts_in_step(true, in_the_longer);
+    EXPECT_GT(rise_K(*late), 0.98 * rise_K(*on_time)) << in_the_longer;
+    EXPECT_LT(rise_K(*late), 1.05 * rise_K(*on_time)) << in_the_longer << ": nor finds any";
+    EXPECT_GT(late->board_heat().used_ratio(), 0.98f * on_time->board_heat().used_ratio()) << in_the_longer;
+  }
 }
 
 TEST(Axis, WhatFlowsThroughTheDiodesBesideARefusedSampleHeats) {

@@ -52,6 +52,25 @@ TEST(Memory, TheHousingMayRaiseARestoredWindingButItsColdDoesNotLowerIt) {
   }
 }
 
+/// The winding seems cold again, and yet little is allowed: the report must show why.
+TEST(Memory, TheReportShowsWhatIsDoubtedAfterAReset) {
+  Driver driver(bench::driver_setup());
+  driver.restore(hot_memory());
+  float most_beside_K = 0.0f;
+  for (int i = 0; i < 600; ++i) {
+    slow(driver, 25.0f, 1);
+    const firmware::Axis& axis = driver.axis(0);
+    const thermal::Estimate& now = axis.core().estimate();
+    int hottest = 0;
+    for (int k = 1; k < 3; ++k)
+      if (now.degC[k] > now.degC[hottest]) hottest = k;
+    const float k_sigma_K = now.margin_degC[hottest] - static_cast<float>(now.degC[hottest]);
+    ASSERT_NEAR(2.0f * axis.state().core_sigma_K, k_sigma_K, 1e-3f) << "all that the governor adds, at tick " << i;
+    most_beside_K = std::fmax(most_beside_K, k_sigma_K - 2.0f * now.sigma_K[hottest]);
+  }
+  EXPECT_GT(most_beside_K, 10.0f) << "nothing was doubted, so nothing was shown";
+}
+
 TEST(Memory, EachValueThatIsNoTemperatureCountsAsTheLimit) {
   for (const float bad : {nan_f, std::numeric_limits<float>::infinity(), -1e9f, 1e30f}) {
     for (int node = 0; node < 4; ++node) {
