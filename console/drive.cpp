@@ -16,6 +16,26 @@ constexpr double interval_s = 0.005;  // a twentieth of the time-out of setpoint
 // Against creeping: 2 mA per rad/s slows the rotor of a 40 W motor within 0.1 s, far slower than setpoints come, and
 // the most it may ask for moves no robot.
 constexpr float hold_A_s_per_rad = 0.002f, hold_most_A = 0.2f;
+// To turn a free shaft against its friction, whatever that is: within seconds, up to what a motor of 40 W needs idle.
+constexpr float turn_A_per_rad = 0.002f, turn_most_A = 0.5f;
+
+/// The iq of a shaft that is held, or kept turning.
+class Hold {
+ public:
+  explicit Hold(float rad_per_s) : rad_per_s_(rad_per_s) {}
+  float current_A() const { return current_A_; }
+  void see(float rad_per_s) {
+    const float slow = rad_per_s_ - rad_per_s;
+    current_A_ = std::clamp(hold_A_s_per_rad * slow, -hold_most_A, hold_most_A);
+    if (rad_per_s_ == 0) return;
+    against_friction_A_ += turn_A_per_rad * slow * static_cast<float>(interval_s);
+    against_friction_A_ = std::clamp(against_friction_A_, 0.0f, turn_most_A);
+    current_A_ += against_friction_A_;
+  }
+
+ private:
+  float rad_per_s_, current_A_ = 0, against_friction_A_ = 0;
+};
 
 }  // namespace
 
@@ -60,20 +80,21 @@ void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
 }
 
 std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
-                                           Along along, const std::function<void(const wire::State&, double)>& look) {
+                                           Along along, const std::function<void(const wire::State&, double)>& look,
+                                           float turning_rad_per_s) {
   std::array<Driven, wire::axis_count> all;
   const double start_s = session.now_s();
   double last_s = start_s, end_s = start_s, next_s = start_s;
   bool begun = false;
-  float hold_A[wire::axis_count]{};
+  std::array<Hold, wire::axis_count> hold = {Hold(turning_rad_per_s), Hold(turning_rad_per_s)};
   for (const Piece& piece : profile) {
     end_s += double{piece.seconds};
     do {  // once at least: what is told is what the board said
       stop_if_interrupted("Stopped and disarmed.");
-      const bool turning = along == Along::q;
-      const float d_A = turning ? 0 : piece.level, q = turning ? piece.level : 0;
-      const wire::State state =
-          session.exchange({mask, {piece.mode, piece.mode}, 0, {d_A, d_A}, {q + hold_A[0], q + hold_A[1]}});
+      const bool torque = along == Along::q;
+      const float d_A = torque ? 0 : piece.level, q = torque ? piece.level : 0;
+      const wire::State state = session.exchange(
+          {mask, {piece.mode, piece.mode}, 0, {d_A, d_A}, {q + hold[0].current_A(), q + hold[1].current_A()}});
       const double now_s = session.now_s();
       for (int a = 0; a < wire::axis_count; ++a) {
         if ((mask >> a & 1) == 0) continue;
@@ -81,8 +102,7 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
           throw UserError(Exit::refused, fmt::format("Axis {} tripped after {:.2f} s: {}.", a, now_s - start_s,
                                                      fault_sentence(session.fault(a))));
         }
-        if (!turning)
-          hold_A[a] = std::clamp(-hold_A_s_per_rad * state.axis[a].speed_rad_per_s, -hold_most_A, hold_most_A);
+        if (!torque) hold[static_cast<std::size_t>(a)].see(state.axis[a].speed_rad_per_s);
         if (state.axis[a].refused != 0) {
           const wire::CodeText text = wire::text_of(state.axis[a].refused);
           throw UserError(Exit::refused, fmt::format("Axis {} refused the setpoint {:g} {}: {}; {}.", a, piece.level,

@@ -39,8 +39,8 @@ struct Driven {
   std::uint8_t limit = 0;  // what held it back most recently
 };
 
-/// Where the current goes: iq turns the shaft; id makes no torque and only heats the winding, and a shaft that creeps
-/// all the same is held by a little iq.
+/// Where the current goes: iq turns the shaft; id makes no torque and only heats the winding, and a little iq holds a
+/// shaft that creeps all the same, or keeps a free one turning slowly.
 enum class Along { q, d };
 
 /// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. What it came to is told of
@@ -48,7 +48,8 @@ enum class Along { q, d };
 /// when an axis trips or refuses a setpoint (as one that has another control mode does), interrupted after Ctrl-C,
 /// gone. The caller holds an Armed.
 std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
-                                           Along along, const std::function<void(const wire::State&, double)>& look);
+                                           Along along, const std::function<void(const wire::State&, double)>& look,
+                                           float turning_rad_per_s = 0);
 
 /// The sentence of a fault: what happened, evidence, advice. Empty for none.
 std::string fault_sentence(const wire::FaultEvidence& evidence);

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "wire/motor.hpp"
 #include "wire/pc/toml_file.hpp"
@@ -13,6 +15,8 @@ namespace console {
 namespace {
 
 using wire::pc::refuse;
+
+constexpr double probe_s = 0.12;  // the ohmmeter needs 0.1 s, and a setpoint may come 5 ms late
 
 double value_of(const Values& values, const std::string& name) {
   const auto at = values.find(name);
@@ -42,6 +46,15 @@ void leave_out_cooler(Offer& offer, const Values& before) {
       fmt::join(left_out, ", "));
 }
 
+/// A parameter of two resistors, or of them with what was found; nothing where the log does not tell it.
+std::optional<double> told(const nlohmann::json& lines, const char* name) {
+  for (const auto& line : lines) {
+    const bool sure = line.value("determined", false) && !line.value("at_bound", true);
+    if (sure && line.value("name", std::string()) == name) return line.value("value", NAN);
+  }
+  return {};
+}
+
 }  // namespace
 
 double continuous_A(const Values& values) {
@@ -52,13 +65,31 @@ double continuous_A(const Values& values) {
   return std::sqrt(rise_K / (1.5 * get("phase_resistance_ohm") * warm * (get("R1_K_per_W") + get("R2_K_per_W"))));
 }
 
+std::vector<Piece> cold_course(const Values& values) {
+  const double rated_A = continuous_A(values);
+  const double rest_s = std::clamp(5 * value_of(values, "R1_K_per_W") * value_of(values, "C1_J_per_K"), 3.0, 20.0);
+  const auto look = [&](double share) {
+    return Piece{static_cast<float>(share * rated_A), static_cast<float>(probe_s)};
+  };
+  const Piece rest{0, static_cast<float>(rest_s)};
+  std::vector<Piece> course;
+  for (int i = 0; i < 4; ++i)
+    course.insert(course.end(), {look(probe_share), look(larger_share), look(probe_share), rest});
+  for (int i = 0; i < 5; ++i) course.insert(course.end(), {look(probe_share), rest});
+  return course;
+}
+
 std::vector<Piece> designed_course(double continuous_A, double minutes) {
   // Shares of the continuous current and seconds: levels apart by design, bursts short enough for any winding that the
-  // look-ahead of a healthy board allows, rests in between.
+  // look-ahead of a healthy board allows, rests in between; the log begins at rest.
   constexpr struct {
     double share, seconds;
-  } round[] = {{0.9, 120}, {0.0, 60}, {2.5, 2},  {0.3, 15}, {2.0, 4}, {0.3, 15},
-               {2.5, 2},   {0.0, 20}, {0.6, 90}, {1.8, 5},  {0.0, 67}};
+  } look = {probe_share, probe_s}, round[] = {{0.0, 10}, {0.9, 40}, look,      {0.9, 80}, look,
+                                              {0.0, 3},  look,      {0.0, 7},  look,      {0.0, 40},
+                                              {2.5, 2},  look,      {0.3, 15}, look,      {2.0, 4},
+                                              look,      {0.3, 15}, look,      {2.5, 2},  look,
+                                              {0.0, 20}, look,      {0.6, 90}, look,      {probe_share, 5},
+                                              {0.0, 3},  look,      {0.0, 56}};
   std::vector<Piece> course;
   double left_s = 60 * minutes;
   for (int i = 0; left_s > 0; i = (i + 1) % static_cast<int>(std::size(round))) {
@@ -135,33 +166,43 @@ Offer offer(const nlohmann::json& answer, const std::string& model_path, const V
   const double housing_noise_K = value_of(before, "housing_noise_K");
   Offer offer;
   std::string why;
-  if (answer.is_object() && answer.value("verdict", std::string()) == "insufficient") {
+  const auto at = [&](const char* path) {
+    return answer.is_object() ? answer.value(nlohmann::json::json_pointer(path), nlohmann::json()) : nlohmann::json();
+  };
+  const auto verdict = answer.is_object() ? answer.value("verdict", std::string()) : std::string();
+  if (verdict == "insufficient") {
     offer.note = "this log cannot tell; the board's parameters stay as they are";
     return offer;
   }
   offer.values = parameters_of_model(model_path, why);
+  const nlohmann::json plain = at("/baseline/parameters"), extended = at("/parameters_with_causes");
+  bool tells_winding = at("/baseline/rmse_K/core").is_number();
   if (offer.values.empty()) {
-    const auto miss = !answer.is_object() ? nlohmann::json()
-                                          : answer.value("/baseline/rmse_K/housing"_json_pointer, nlohmann::json());
+    const auto miss = at("/baseline/rmse_K/housing");
     if (!miss.is_number() || miss.get<double>() > housing_noise_K) {
       offer.note = fmt::format("the model has {}, which this board's parameters cannot express", why);
       return offer;
     }
-    for (const auto& line : answer.value("/baseline/parameters"_json_pointer, nlohmann::json::array())) {
-      const std::string name = line.value("name", std::string());
-      const bool sure = line.value("determined", false) && !line.value("at_bound", true);
-      if (sure && name == "R2") offer.values["R2_K_per_W"] = line.value("value", NAN);
-      if (sure && name == "C2") offer.values["C2_J_per_K"] = line.value("value", NAN);
+    for (const auto& [name, key] :
+         {std::pair{"R1", "R1_K_per_W"}, {"R2", "R2_K_per_W"}, {"C1", "C1_J_per_K"}, {"C2", "C2_J_per_K"}}) {
+      if (const auto value = told(plain, name)) offer.values[key] = static_cast<float>(*value);
     }
+    tells_winding = tells_winding && verdict == "adequate";
     offer.note = fmt::format(
         "The board cannot express {}, but without it the housing is missed by {:.2f} K only, less than housing_noise_K",
         why, miss.get<double>());
   } else {
+    const nlohmann::json& lines = extended.empty() ? plain : extended;
+    tells_winding = tells_winding && told(lines, "R1") && told(lines, "C1");
     offer.note = "The board can express all of it";
   }
-  offer.values.erase("R1_K_per_W");
-  offer.values.erase("C1_J_per_K");
-  offer.note += "; R1 and C1 stay: a housing sensor alone does not tell the winding well enough";
+  if (!tells_winding) {
+    offer.values.erase("R1_K_per_W");
+    offer.values.erase("C1_J_per_K");
+    offer.note +=
+        "; R1 and C1 stay: a housing sensor alone does not tell the winding well enough (--turning reads "
+        "the winding, where the shaft is free)";
+  }
   if (!room_told) leave_out_cooler(offer, before);
   return offer;
 }

@@ -19,8 +19,15 @@ using Values = std::map<std::string, float>;
 /// Throws UserError (usage) naming the first one that is unset.
 double continuous_A(const Values& values);
 
-/// Steps of a minute and more tell the housing's resistance and capacity, bursts of seconds the winding's, rests both.
-/// Amperes are shares of the continuous current up to 2.5 times; the governor may cut bursts, which the log then shows.
+/// At this current the winding's resistance is read, as share of the continuous one: what dead time adds hangs on the
+/// rotor's angle, which may creep, by 8 K of an EC 16 at 0.9, and by 1.7 K here.
+inline constexpr double probe_share = 1.8, larger_share = 2.5;
+/// While all is cold: four times the probe, the larger current and the probe; then five times the probe; and after each
+/// a rest in which the winding cools.
+std::vector<Piece> cold_course(const Values& values);
+/// Steps of a minute and more tell the housing's resistance and capacity, bursts of seconds the winding's, rests both;
+/// after each burst and in rests the winding is read. Amperes are shares of the continuous current up to 2.5 times; the
+/// governor may cut bursts, which the log then shows.
 std::vector<Piece> designed_course(double continuous_A, double minutes);
 
 /// A motor sheet (TOML) that says what the board believes: identify's gauge is then the board's resistance.
@@ -38,10 +45,11 @@ struct Offer {
 
 /// From identify's answer (JSON) and model file. A housing sensor alone tells the winding's R1 and C1 only through a
 /// housing that hardly feels them: a small effect outside the model moves them by tens of percent, to the cold side as
-/// well, so they are never offered. If the model found has more than parameters can express, R2 and C2 of the plain
-/// two-resistor fit are, provided that it misses the housing by less than `housing_noise_K`, which the board grants
-/// anyway. Unless the room was told, nothing is offered that takes the motor for cooler than `before`: from a log that
-/// begins above its room it seems to cool better than it does, at 20 K twice as well.
+/// well, so they are offered only where the winding's resistance was read. If the model found has more than parameters
+/// can express, R2 and C2 of the plain two-resistor fit are, provided that it misses the housing by less than
+/// `housing_noise_K`, which the board grants anyway. Unless the room was told, nothing is offered that takes the motor
+/// for cooler than `before`: from a log that begins above its room it seems to cool better than it does, at 20 K twice
+/// as well.
 Offer offer(const nlohmann::json& answer, const std::string& model_path, const Values& before, bool room_told);
 
 }  // namespace console

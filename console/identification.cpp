@@ -7,12 +7,15 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "console/commands.hpp"
 #include "console/drive.hpp"
 #include "console/heat_experiment.hpp"
+#include "console/ohmmeter.hpp"
 #include "console/parameter_file.hpp"
 #include "console/recorder.hpp"
 #include "wire/pc/files.hpp"
@@ -67,32 +70,113 @@ Values values_of(Session& session, int axis) {
 
 struct Arguments {
   std::string axis = "0", out = "out/identify";
-  double minutes = 20;
+  double minutes = 20, leads_ohm = 0.01;
   std::optional<double> ambient_degC;
-  bool yes = false, save = false, force = false;
+  bool turning = false, yes = false, save = false, force = false;
+};
+
+constexpr double log_Hz = 20;
+constexpr int telemetry_rows = 25;  // to one of the log, where the ohmmeter looks on
+// Electrical: 19 turns a second, so that phases share the heat of any winding (heat.params: R1 C1 is at least 0.5 s).
+constexpr float turning_rad_per_s = 120;
+
+/// The course's log where the winding is read: the current that heats as that until the next row did; last, the
+/// resistance that was read nearest to the row.
+class WindingLog {
+ public:
+  explicit WindingLog(const Ohmmeter& ohmmeter) : ohmmeter_(ohmmeter) {}
+
+  /// First what the ohmmeter needs.
+  static std::vector<Target> signals(Session& session, int axis) {
+    return signals_called({"id_permitted_A", "id_A", "vd_asked_V", "voltage_share", "current_A", "speed_rad_per_s",
+                           "bus_V", "housing_measured_degC", "ambient_degC", "board_degC", "core_a_degC", "core_b_degC",
+                           "core_c_degC", "housing_degC", "allowance_A", "limit"},
+                          session.signals(), axis);
+  }
+
+  /// Ends what was read while all was cold; rows begin with that, being as cold.
+  void begin() {
+    cold_ohm_ = ohmmeter_.cold();
+    begun_ = true;
+  }
+
+  void take(double time_s, const std::vector<float>& row, LogFile& file) {
+    const auto reading = ohmmeter_.take({time_s, row[0], row[1], row[2], row[3]});
+    if (!begun_) return;
+    if (reading && !cold_ohm_.empty()) {
+      const bool nearer = !last_.empty() && reading->time_s - last_s_ < 0.5 / log_Hz;
+      (nearer ? last_.back() : next_ohm_) = static_cast<float>(reading->ohm);
+    }
+    if (taken_ == telemetry_rows) {
+      last_[current] = std::sqrt(current_A2_ / telemetry_rows);
+      file.add(last_s_, last_);
+      taken_ = 0;
+      current_A2_ = 0;
+    }
+    current_A2_ += row[current] * row[current];
+    if (taken_++ > 0) return;
+    if (written_ < cold_ohm_.size()) next_ohm_ = static_cast<float>(cold_ohm_[written_++]);
+    last_ = row;
+    last_s_ = time_s;
+    last_.push_back(std::exchange(next_ohm_, nothing));
+  }
+
+ private:
+  static constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+  static constexpr std::size_t current = 4;  // among the signals
+
+  Ohmmeter ohmmeter_;
+  std::vector<double> cold_ohm_;
+  bool begun_ = false;
+  std::vector<float> last_;  // not yet in the file
+  double last_s_ = 0;
+  float next_ohm_ = nothing, current_A2_ = 0;
+  int taken_ = 0;
+  std::size_t written_ = 0;
 };
 
 /// Drives the designed course and logs it.
-Driven record(Console& console, int axis, const std::vector<Piece>& course, const std::string& log) {
+Driven record(Console& console, int axis, const Values& before, const Arguments& a, const std::string& log) {
   Session& session = console.session();
   const auto mask = static_cast<std::uint8_t>(1 << axis);
-  Recorder recorder(session, log, fmt::format("axis {}, designed course for identification", axis),
-                    usual_signals(session.signals(), axis), 10);
+  const double rated_A = continuous_A(before);
+  std::vector<Piece> course = designed_course(rated_A, a.minutes);
   double length_s = 0, told_s = -1e9;
   for (const Piece& piece : course) length_s += double{piece.seconds};
+  const auto look = [&](const wire::State& state, double time_s) {
+    if (time_s - told_s < length_s / 10) return;
+    told_s = time_s;
+    console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed", 100 * time_s / length_s,
+                             state.axis[axis].core_degC, std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
+                             state.axis[axis].allowance_A));
+  };
+  const auto play = [&](const std::vector<Piece>& pieces, float electrical_rad_per_s) {
+    return drive(session, mask, pieces, Along::d, look,
+                 electrical_rad_per_s / before.at("pole_pairs"))[static_cast<std::size_t>(axis)];
+  };
+
+  const std::string what = fmt::format("axis {}, designed course for identification", axis);
+  WindingLog winding(
+      Ohmmeter(static_cast<float>(probe_share * rated_A), static_cast<float>(larger_share * rated_A), a.leads_ohm));
+  Recorder recorder =
+      a.turning
+          ? Recorder(
+                session, log, what, WindingLog::signals(session, axis), telemetry_rows * log_Hz, {"winding_ohm"},
+                [&](double time_s, const std::vector<float>& row, LogFile& file) { winding.take(time_s, row, file); })
+          : Recorder(session, log, what, usual_signals(session.signals(), axis), log_Hz);
   Driven driven;
   try {
     {
       Armed armed(session, mask);
-      const auto look = [&](const wire::State& state, double time_s) {
-        if (time_s - told_s < length_s / 10) return;
-        told_s = time_s;
-        console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed",
-                                 100 * time_s / length_s, state.axis[axis].core_degC,
-                                 std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
-                                 state.axis[axis].allowance_A));
-      };
-      driven = drive(session, mask, course, Along::d, look)[static_cast<std::size_t>(axis)];
+      if (a.turning) {
+        play(cold_course(before), turning_rad_per_s);
+        // At rest, as the log has to begin.
+        play({{0, 2}}, 0);
+        winding.begin();
+        play({course.front()}, 0);
+        course.erase(course.begin());
+      }
+      driven = play(course, a.turning ? turning_rad_per_s : 0);
     }
     recorder.finish();
   } catch (const UserError& error) {
@@ -128,10 +212,10 @@ void identify(Console& console, const Arguments& a) {
 
   console.tell(fmt::format(
       "Heating axis {} for {:g} min with up to {:.1f} A along the magnet, which makes no torque; the shaft "
-      "must be free to stand still. Ctrl-C disarms.{}",
-      axis, a.minutes, 2.5 * rated_A,
+      "{}. Ctrl-C disarms.{}",
+      axis, a.minutes, 2.5 * rated_A, a.turning ? "must be free, it turns slowly" : "must be free to stand still",
       a.ambient_degC ? "" : " Without --ambient DEGC the room is taken to be as warm as the motor is now."));
-  const Driven driven = record(console, axis, designed_course(rated_A, a.minutes), log);
+  const Driven driven = record(console, axis, before, a, log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));
   std::filesystem::remove(model);  // of an earlier run
   std::vector<std::string> words = {
@@ -198,6 +282,10 @@ void add_identify(CLI::App& app, Console& console) {
   command
       ->add_option("--ambient", a->ambient_degC, "how warm the room is, degC; else what the motor begins at is taken")
       ->check(between(-40, 55));
+  command->add_flag("--turning", a->turning, "let the free shaft turn slowly, so that R1 and C1 are found as they are");
+  command->add_option("--leads", a->leads_ohm, "ohm in series with a phase, the board's switch and shunt included")
+      ->capture_default_str()
+      ->check(between(0, 1));
   command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
   command->add_flag("--yes", a->yes, "write what was found without asking");
   command->add_flag("--save", a->save, "and keep it over a reset");

@@ -2,7 +2,7 @@
 // Telemetry of one axis into a log while the session does something else.
 #pragma once
 
-#include <optional>
+#include <functional>
 
 #include "console/log_file.hpp"
 
@@ -10,9 +10,13 @@ namespace console {
 
 class Recorder {
  public:
-  /// Subscribes to the signals at about `rate_Hz` and opens the log.
+  /// What goes into the file of a row of telemetry.
+  using Sieve = std::function<void(double time_s, const std::vector<float>& row, LogFile& file)>;
+
+  /// Subscribes to the signals at about `rate_Hz` and opens the log. Without a `sieve` each row goes into it as it is;
+  /// with one it may add columns of its own.
   Recorder(Session& session, const std::string& path, const std::string& what, const std::vector<Target>& signals,
-           double rate_Hz);
+           double rate_Hz, const std::vector<std::string>& more_columns = {}, Sieve sieve = {});
   /// Without finish(): nothing more is taken, and what came is kept.
   ~Recorder() { session_.take_no_more(); }
   Recorder(const Recorder&) = delete;
@@ -31,12 +35,15 @@ class Recorder {
 
   Session& session_;
   LogFile file_;
+  Sieve sieve_;
   BoardTime time_;
   double rate_Hz_ = 0;
   std::vector<float> row_;
   std::uint32_t dropped_ = 0;
 };
 
+/// Those of one axis, and of the board, that are called so, as many as fit.
+std::vector<Target> signals_called(const std::vector<std::string>& names, const Dictionary& signals, int axis);
 /// What a log holds unless told otherwise: what identify needs, and what the board makes of it.
 std::vector<Target> usual_signals(const Dictionary& signals, int axis);
 

@@ -122,6 +122,23 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreNeverOfferedFromTheHousingAlone) {
   EXPECT_EQ(offered.values, expected);
 }
 
+TEST(HeatExperiment, TheWindingsOwnValuesAreOfferedWhereItWasReadAndTellsThem) {
+  const std::string model = file("model.toml", two_resistors),
+                    gain = file("gain.toml", two_resistors + "[housing_sensor]\ngain_error = 0.02\n");
+  nlohmann::json read = answer(0.1, true);
+  read["baseline"]["rmse_K"]["core"] = 0.8;
+  const auto offered = console::offer(read, model, believed(), true);
+  EXPECT_TRUE(offered.values.contains("R1_K_per_W") && offered.values.contains("C1_J_per_K")) << offered.note;
+  EXPECT_EQ(offered.note.find("stay"), std::string::npos) << offered.note;
+  // What the board cannot express is left out where two resistors do, and only there.
+  EXPECT_FALSE(console::offer(read, gain, believed(), true).values.contains("R1_K_per_W"));
+  read["verdict"] = "adequate";
+  EXPECT_FLOAT_EQ(console::offer(read, gain, believed(), true).values.at("R1_K_per_W"), 0.6f);
+  EXPECT_FLOAT_EQ(console::offer(read, gain, believed(), true).values.at("C1_J_per_K"), 1.7f);
+  read["baseline"]["parameters"][0]["determined"] = false;
+  EXPECT_FALSE(console::offer(read, model, believed(), true).values.contains("R1_K_per_W"));
+}
+
 TEST(HeatExperiment, OfALogThatCannotTellNothingIsOffered) {
   nlohmann::json insufficient = answer(0.1, true);
   insufficient["verdict"] = "insufficient";

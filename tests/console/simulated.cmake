@@ -47,6 +47,10 @@ expect(prompt_in_torque_mode 0 "axis 1: torque mode, setpoints in N m.*1    read
 set(typed "")
 expect(identification 0 "axis0.R2_K_per_W +16.3 -> 1[567].*In force until" ${sim} identify --minutes 6 --out found --ambient 25 --yes)
 expect(identification_of_an_unknown_room 0 "left out, since it takes the motor for cooler and nobody told how warm the room was .--ambient DEGC.: R2_K_per_W.*Nothing to write" ${sim} identify --minutes 6 --out cold --yes)
+# A board that takes its winding for much cooler than it is; its true R1 is 1.08 K/W, C1 1.13 J/K.
+set(typed "set axis0.R1_K_per_W=0.7 axis0.C1_J_per_K=1.9\nidentify --turning --minutes 7 --out turned --ambient 25 --yes\nquit\n")
+expect(identification_of_the_winding 0 "axis0.C1_J_per_K +1.9 -> 1\\.[01].*axis0.R1_K_per_W +0.7 -> 1\\.[01].*In force until" ${sim})
+set(typed "")
 
 # An identify beside hotcore that ends as by Ctrl-C, which reaches both, and one that is killed.
 file(COPY ${HOTCORE} DESTINATION ${SCRATCH}/beside)
