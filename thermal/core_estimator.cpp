@@ -14,31 +14,12 @@ constexpr float dt_f = static_cast<float>(estimator_dt_s);
 
 // Between these a temperature can be true; outside them the arithmetic or the memory is broken.
 constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
-// A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
-constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
-
-constexpr int window_steps = 50;           // the housing is heard twice a second: faster only averages its noise
-constexpr int missing_steps = 10;          // 100 ms without a reading: safety table, NTC open or short
-constexpr int slow_window_steps = 200;     // a sensor that needs longer to fill a window is no better than none: chosen
-constexpr int most_lost_steps = 200;       // 2 s: no watchdog waits longer
-constexpr float most_follow = 1.4f;        // K of a winding by which copper follows a kelvin of its housing
-constexpr float most_pull_K = 3.5f;        // safety table: never lowered by more than 5 K, over most_follow
-constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
-constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
-constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
+constexpr int most_lost_steps = 200;     // 2 s: no watchdog waits longer
+constexpr float most_follow = 1.4f;      // K of a winding by which copper follows a kelvin of its housing
 constexpr float unheard_sigma_K = 3.0f;  // that housing and ambient are less known by, once nothing tells them; chosen
-constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;  // as slowly as an ambient drifts (below)
-constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
-// Of what the model expects: a sensor that comes off by half is not alive. Above 0.7 honest sensors fail as well, on
-// motors that their sheet does not fit (at 0.9 these lose a tenth of their A^2 s, at 0.7 a hundredth).
-constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
-// A reading that falls by twice what the model does, and by this more, has come off a motor that cools: chosen; a motor
-// of 60 K above a frost that its model does not know of falls by as much more in two minutes.
-constexpr float off_share = 2.0f, off_K = 10.0f;
 constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
 constexpr float restored_hotter_K = 10.0f;
-constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
-constexpr int acquired_readings = 120;    // a minute: what a start without memory takes to prove itself
+constexpr float known_sigma_K = 3.0f;     // of a housing that is known: from here on its sensor pulls little; chosen
 constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
 constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
 
@@ -84,7 +65,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
   sensor_degC_ = sensed_degC(ambient_degC_);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // to begin is no movement
+  watch_.model_jumped(static_cast<float>(sensor_degC_));
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
   due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
@@ -126,8 +107,7 @@ const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, R
     for (int i = 0; i < lost_steps && i < most_lost_steps; ++i) step();
     if (lost_steps > most_lost_steps) raise_to(static_cast<float>(hottest_limit_degC()) - unknown_below_K);
   }
-  ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
-                   measured_ambient.value < hottest_reading_degC;
+  ambient_known_ = measured_ambient.usable();
   if (ambient_known_) ambient_degC_ = static_cast<double>(measured_ambient.value);
   step();
   hear_housing(housing);
@@ -212,7 +192,7 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   doubted_K_ = f.lazyProduct(doubted_K_).eval();
   kept_K_ = f.lazyProduct(kept_K_).eval();
   for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
-  if (heard_.acquired && p_(ambient(), ambient()) < squared(ambient_worst_K))
+  if (watch_.housing_known() && p_(ambient(), ambient()) < squared(ambient_worst_K))
     p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
   if (ambient_known_) {
     p_.row(ambient()).setZero();
@@ -222,46 +202,25 @@ void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates
   }
 }
 
-/// Gathers half a second of readings, watches whether they move as the model does, and then lets them correct.
 void CoreEstimator::hear_housing(Reading housing) {
-  const float leak = dt_f / movement_memory_s;
-  const float sensor_degC = static_cast<float>(sensor_degC_) - kept_K_[sensor()];
-  heard_.model_moved_K += sensor_degC - last_sensor_degC_ - leak * heard_.model_moved_K;
-  last_sensor_degC_ = sensor_degC;
+  watch_.model_moved(static_cast<float>(sensor_degC_) - kept_K_[sensor()]);
   settle(1);
-  heard_.pulled_K =
-      heard_.pulled_K > pull_forgotten_K_per_s * dt_f ? heard_.pulled_K - pull_forgotten_K_per_s * dt_f : 0.0f;
+  const auto heard = watch_.hear(housing, sensor_degC_ + static_cast<double>(due_K_[sensor()]));
+  if (heard.fell_silent) lose_surroundings();
+  if (!heard.full) return;
+  if (!watch_.housing_known()) believe_ambient_below(housing_of_degC(static_cast<double>(heard.reading_degC)));
+  if (heard.first && resumed_ && housing_.lag_s > 0.0)
+    meet_sensor(heard.reading_degC);
+  else if (watch_.housing_known())
+    follow_housing(heard.above_model_K);
+  else
+    meet_housing(heard.reading_degC, heard.above_model_K);
+}
 
-  const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
-  if (heard_.unheard < slow_window_steps) ++heard_.unheard;
-  if (!usable && heard_.silent < missing_steps) ++heard_.silent;
-  if (usable) heard_.silent = 0;
-  if ((heard_.silent == missing_steps || heard_.unheard == slow_window_steps) && !(flags_ & housing_missing)) {
-    flags_ |= housing_missing;
-    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
-    p_(ambient(), ambient()) += squared(unheard_sigma_K);
-  }
-  if (heard_.silent == missing_steps) {
-    window_ = 0;
-    reading_sum_ = sensor_sum_ = 0.0;
-  }
-  if (!usable) return;
-  reading_sum_ += static_cast<double>(housing.value);
-  sensor_sum_ += sensor_degC_ + static_cast<double>(due_K_[sensor()]);  // as if it had all flowed in
-  if (++window_ < window_steps) return;
-
-  const float reading_degC = static_cast<float>(reading_sum_ / window_);
-  const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / window_);
-  if (heard_.unheard < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
-  window_ = heard_.unheard = 0;
-  reading_sum_ = sensor_sum_ = 0.0;
-  const bool first = !heard_.read;
-  if (first) heard_.reading_slow_degC = reading_degC;
-  heard_.read = true;
-  if (!heard_.acquired) believe_ambient_below(housing_of_degC(static_cast<double>(reading_degC)));
-  heard_.reading_slow_degC += (reading_degC - heard_.reading_slow_degC) * (window_steps * leak);
-  heard_.reading_moved_K = reading_degC - heard_.reading_slow_degC;
-  correct_by_housing(reading_degC, innovation_K, first);
+/// Nothing tells any more what housing and ambient are.
+void CoreEstimator::lose_surroundings() {
+  p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
+  p_(ambient(), ambient()) += squared(unheard_sigma_K);
 }
 
 /// The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
@@ -272,7 +231,7 @@ void CoreEstimator::believe_ambient_below(double housing_degC) {
 /// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
 void CoreEstimator::meet_sensor(float reading_degC) {
   sensor_degC_ = static_cast<double>(reading_degC);
-  last_sensor_degC_ = reading_degC - kept_K_[sensor()];
+  watch_.model_jumped(reading_degC - kept_K_[sensor()]);
   p_.row(sensor()).setZero();
   p_.col(sensor()).setZero();
   late_shared_K_[sensor()] = 0.0f;
@@ -286,77 +245,57 @@ void CoreEstimator::meet_sensor(float reading_degC) {
 void CoreEstimator::doubt(float left_K) {
   degC_.array() -= static_cast<double>(left_K);
   sensor_degC_ -= static_cast<double>(left_K);
-  last_sensor_degC_ -= left_K;
+  watch_.model_corrected(-left_K);
   doubted_K_.head(n_).array() += left_K;
   doubted_K_[sensor()] += left_K;
 }
 
-void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
-  Row seen = Row::Zero(n_ + 5);
-  seen[sensor()] = 1.0f;
-  const float noise = squared(settings_.housing_noise_K);
-  const float late_K = static_cast<float>(late_K_);
-  if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
-  if (!heard_.acquired) {
-    const Vector before_degC = degC_;
-    if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
-    const int h = housing_.node;
-    heard_.acquired =
-        p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++heard_.met >= acquired_readings;
-    heard_.trusted_ambient_degC = ambient_degC_;
-    // After a reset the winding does not follow the housing by itself.
-    raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
-    if (remembers_) {
-      const Vector fall_K = before_degC - degC_;
-      doubted_K_.head(n_) += fall_K.cast<float>();
-      kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
-    }
-    const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
-    if (heard_.acquired && guessed_ && left_K > least_gate_K) doubt(left_K);
-    return;
+/// Until the housing is known its readings count without limit.
+void CoreEstimator::meet_housing(float reading_degC, float above_model_K) {
+  const Vector before_degC = degC_;
+  const float no_limit_K = std::numeric_limits<float>::infinity();
+  if (!correct_by_sensor(above_model_K, no_limit_K, 1)) return;
+  const int h = housing_.node;
+  const bool known = watch_.meet(p_(h, h) + squared(late_shared_K_[h]) < squared(known_sigma_K), ambient_degC_);
+  // After a reset the winding does not follow the housing by itself.
+  raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
+  if (remembers_) {
+    const Vector fall_K = before_degC - degC_;
+    doubted_K_.head(n_) += fall_K.cast<float>();
+    kept_K_.head(n_) += (Vector::Constant(n_, fall_K[h]) - fall_K).cast<float>();
   }
-  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
-  const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
-  // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
-  const float expected_K = std::abs(heard_.model_moved_K);
-  const float moved_K = heard_.model_moved_K < 0.0f ? -heard_.reading_moved_K : heard_.reading_moved_K;
-  const bool tested = expected_K >= enough_movement_K;
-  const bool fallen = moved_K > off_share * expected_K && moved_K > expected_K + off_K;
-  if (tested && moved_K >= alive_share * expected_K && !fallen) {
-    heard_.pulled_K = 0.0f;
-    heard_.trusted_ambient_degC = ambient_degC_;
-    doubted_K_.setZero();
-  }
-  const bool stuck = tested && moved_K < stuck_share * expected_K && heard_.pulled_K > suspicious_pull_K;
-  const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
-  const bool colder = innovation_K < -least_gate_K - kept_K && heard_.pulled_K >= most_pull_K;
-  if (!(innovation_K > -gate_K - kept_K) || (innovation_K < 0.0f && (stuck || colder))) {
-    disbelieve_housing();
-    return;
-  }
-  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
-  const float left_K = most_pull_K - heard_.pulled_K;
-  // Hotter than believable counts for as much as is believable, and each further time for twice as much: a glitch of a
-  // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
-  const float believed_K = std::fmax(gate_K, heard_.hotter_K);
-  heard_.hotter_K = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
-  correct(seen, std::fmin(innovation_K, believed_K), noise, late_K, left_K > 0.0f ? left_K : 0.0f, window_steps);
+  const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
+  if (known && guessed_ && left_K > least_gate_K) doubt(left_K);
 }
 
-/// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
-void CoreEstimator::disbelieve_housing() {
-  if (!(flags_ & housing_contradicts)) {
-    settle(due_steps_);
-    due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
-    due_K_ = due_margin_K_ + Row::Constant(n_ + 5, heard_.pulled_K);
-    doubted_K_.setZero();
-    const float ambient_K = static_cast<float>(heard_.trusted_ambient_degC - ambient_degC_);
-    due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
-    due_steps_ = window_steps;
-    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
-    p_(ambient(), ambient()) += squared(unheard_sigma_K);
-  }
-  flags_ |= housing_contradicts;
+/// From then on only as far as its sensor is believed.
+void CoreEstimator::follow_housing(float above_model_K) {
+  const float late_K = late_shared_K_[sensor()] - static_cast<float>(late_K_);
+  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_K) + squared(settings_.housing_noise_K));
+  const auto verdict = watch_.judge(above_model_K, sigma_K, std::fmax(kept_K_[sensor()], 0.0f), ambient_degC_);
+  if (verdict.lives) doubted_K_.setZero();
+  if (verdict.believed)
+    correct_by_sensor(verdict.counts_as_above_K, verdict.most_down_K, HousingWatch::window_steps);
+  else if (verdict.believed_till_now)
+    give_back();
+}
+
+bool CoreEstimator::correct_by_sensor(float above_model_K, float most_down_K, int over_steps) {
+  Row seen = Row::Zero(n_ + 5);
+  seen[sensor()] = 1.0f;
+  return correct(seen, above_model_K, squared(settings_.housing_noise_K), static_cast<float>(late_K_), most_down_K,
+                 over_steps);
+}
+
+/// What a sensor had taken away that is no longer believed.
+void CoreEstimator::give_back() {
+  settle(due_steps_);
+  due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
+  due_K_ = due_margin_K_ + Row::Constant(n_ + 5, watch_.pulled_K());
+  doubted_K_.setZero();
+  due_K_[ambient()] = std::fmax(static_cast<float>(watch_.trusted_ambient_degC() - ambient_degC_), 0.0f);
+  due_steps_ = HousingWatch::window_steps;
+  lose_surroundings();
 }
 
 /// How far a correction lowers the winding, K; negative if it raises all of them. What the housing falls the windings
@@ -377,7 +316,7 @@ void CoreEstimator::settle(int steps) {
   for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
   ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
   sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
-  last_sensor_degC_ += part * due_K_[sensor()];  // a correction is not a movement of the model
+  watch_.model_corrected(part * due_K_[sensor()]);
   due_K_ *= 1.0f - part;
   due_margin_K_ *= 1.0f - part;
   due_steps_ -= steps;
@@ -402,14 +341,11 @@ bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_
   if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
   Row gain = shared / expected_K2;
   gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_ || (!heard_.acquired && innovation_K < 0.0f))
+  if (ambient_known_ || (!watch_.housing_known() && innovation_K < 0.0f))
     gain[ambient()] = 0.0f;  // the first reading did that
   const float down_K = down_by(gain, innovation_K);
   if (down_K > most_down_K) gain *= most_down_K / down_K;
-  if (std::isfinite(most_down_K)) {
-    const float pulled_K = heard_.pulled_K + down_by(gain, innovation_K);  // net: noise up and down cancels
-    heard_.pulled_K = pulled_K > 0.0f ? pulled_K : 0.0f;
-  }
+  if (std::isfinite(most_down_K)) watch_.note_pull(down_by(gain, innovation_K));
   // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
   // less heat. So a winding falls no further than it would follow.
   if (seen[sensor()] != 0.0f && innovation_K < 0.0f) {
@@ -486,7 +422,7 @@ HeatMemory CoreEstimator::save() const {
                     {},
                     {},
                     static_cast<float>(ambient_degC_),
-                    flags_ & housing_contradicts ? 1u : 0u,
+                    watch_.contradicts() ? 1u : 0u,
                     late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
   for (int i = 0; i < n_; ++i) {
     // What is due now is so later, and what is doubted not proven.
@@ -532,8 +468,8 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
     if (plausible(saved)) doubted_K_[i] = static_cast<float>(std::fmin(saved - degC_[i], 0.0));
     if (remembers_) kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
   }
-  if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
-    flags_ |= housing_contradicts;
+  if (memory.disbelieved != 0) {
+    watch_.disbelieve();
     know_housing(sigma_K[housing_.node]);
   }
   publish();
@@ -542,36 +478,34 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
 /// As well as if its sensor had been heard for long.
 void CoreEstimator::know_housing(float sigma_K) {
   const int h = housing_.node;
-  heard_.acquired = true;
-  heard_.trusted_ambient_degC = ambient_degC_;
+  watch_.know_housing(ambient_degC_);
   p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K);
 }
 
 void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
   const HeatMemory memory = save();
   const HousingSensor<double> described = housing_;
-  const SensorRecord record = heard_;
+  const HousingWatch record = watch_;
   const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
   const double sensed = sensor_degC_ + std::fmax(static_cast<double>(due_K_[sensor()]), 0.0);
-  const std::uint32_t missing = flags_ & housing_missing;
   new (this) CoreEstimator(set, settings);  // in place: too large for the stack
   restore(memory, 0.0);
   const bool same_sensor = memory.node_count == n_ && described.node == housing_.node &&
                            described.lag_s == housing_.lag_s && described.offset_K == housing_.offset_K &&
                            described.gain_error == housing_.gain_error;
   if (!same_sensor) return;
-  heard_ = record;
-  flags_ |= missing;
-  if (record.acquired && memory.disbelieved == 0) {
+  watch_ = record;
+  watch_.drop_window();
+  if (watch_.housing_known() && !watch_.contradicts()) {
     const int h = housing_.node;
     degC_[h] = static_cast<double>(memory.degC[h] - doubted_K);  // not raised: what the sensor said of it stays said
     doubted_K_[h] = doubted_K;
     sensor_degC_ = sensed;
-    last_sensor_degC_ = static_cast<float>(sensed);
     good_degC_ = degC_;
     know_housing(memory.sigma_K[h]);
     believe_ambient_below(static_cast<double>(memory.ambient_degC));  // it would show at once if that is too cold
   }
+  watch_.model_jumped(static_cast<float>(sensor_degC_));
   publish();
 }
 
@@ -599,12 +533,10 @@ double CoreEstimator::hottest_limit_degC() const {
 /// fast they warm (the worst case: the next burst adds to it), and for one that the housing does not show.
 void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
   sensor_degC_ = sensed_degC(degC_[housing_.node]);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  heard_ = {};
+  watch_ = HousingWatch(static_cast<float>(sensor_degC_));
   resumed_ = true;
-  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   remembers_ = guessed_ = false;
   due_steps_ = 0;
   due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
@@ -650,8 +582,8 @@ void CoreEstimator::guard_state() {
   }
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
   sensor_degC_ = sensed_degC(degC_[housing_.node]);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);
-  heard_.model_moved_K = 0.0f;
+  watch_.model_jumped(static_cast<float>(sensor_degC_));
+  watch_.forget_movement();
   late_K_ = 0.0;
   due_steps_ = 0;
   due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
@@ -671,7 +603,8 @@ void CoreEstimator::publish() {
   }
   estimate_.housing_degC = degC_[housing_.node];
   estimate_.ambient_degC = ambient_degC_;
-  estimate_.flags = flags_;
+  estimate_.flags =
+      flags_ | (watch_.missing() ? housing_missing : 0u) | (watch_.contradicts() ? housing_contradicts : 0u);
 }
 
 }  // namespace thermal

@@ -11,17 +11,10 @@
 // heap; every call costs the same but for lost time. Not for an ISR.
 #pragma once
 
+#include "thermal/housing_watch.hpp"
 #include "thermal/network.hpp"
 
 namespace thermal {
-
-inline constexpr double estimator_dt_s = 0.01;
-
-/// A measured value that may be missing; `valid` false: open, short, stale. Then the value means nothing.
-struct Reading {
-  float value;
-  bool valid;
-};
 
 /// Relative standard deviations of what the heat set claims.
 struct Trust {
@@ -140,14 +133,17 @@ class CoreEstimator {
   void step();
   void propagate_covariance(const HeatNetwork<double>::Rates& rates);
   void hear_housing(Reading housing);
-  void correct_by_housing(float reading_degC, float innovation_K, bool first);
   void meet_sensor(float reading_degC);
+  void meet_housing(float reading_degC, float above_model_K);
+  void follow_housing(float above_model_K);
+  bool correct_by_sensor(float above_model_K, float most_down_K, int over_steps);
+  void give_back();
+  void lose_surroundings();
   void doubt(float left_K);
   void believe_ambient_below(double housing_degC);
   void know_housing(float sigma_K);
   double sensed_degC(double housing_degC) const;
   double housing_of_degC(double sensed_degC) const;
-  void disbelieve_housing();
   Row margins_K() const;
   bool hear_winding(float seen_degC, float sigma_K);
   bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
@@ -187,22 +183,9 @@ class CoreEstimator {
   Row kept_K_;  // how much hotter the nodes are than a housing that was off for long; no sensor has to show
   bool remembers_ = false, guessed_ = false;  // since the reset: a warm motor; nothing
 
-  double reading_sum_ = 0.0, sensor_sum_ = 0.0;  // of readings in this window
-  int window_ = 0;                               // steps of them
   bool ambient_known_ = false;
   bool resumed_ = false;  // after a reset: the sensor may lag behind what was remembered
-  float last_sensor_degC_ = 0.0f;
-  /// The housing sensor's record: of the sensor, whatever the model is.
-  struct SensorRecord {
-    int silent = 0, unheard = 0;  // steps without a reading, since a window was last full
-    bool acquired = false, read = false;
-    int met = 0;                        // readings that were believed without limit
-    double trusted_ambient_degC = 0.0;  // when the sensor last proved that it lives
-    float pulled_K = 0.0f;              // how far it has pulled the winding down lately
-    float hotter_K = 0.0f;              // what the next reading that is too hot counts for
-    float model_moved_K = 0.0f;         // how far the model says the housing moved in about two minutes,
-    float reading_slow_degC = 0.0f, reading_moved_K = 0.0f;  // and how far the reading did
-  } heard_;
+  HousingWatch watch_;
 
   std::uint32_t flags_ = 0;
   Estimate estimate_{};
