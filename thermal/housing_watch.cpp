@@ -16,7 +16,7 @@ constexpr int missing_steps = 10;       // 100 ms without a reading: safety tabl
 constexpr int slow_window_steps = 200;  // a sensor that needs longer to fill a window is no better than none: chosen
 constexpr int known_after_means = 120;  // a minute: what a start without memory takes to prove itself
 
-constexpr float most_pull_K = 3.5f;        // safety table: no winding lowered by more than 5 K, 1.4 times the housing
+constexpr float most_pull_K = 3.5f;  // safety table: no winding is lowered by more than 5 K, which is 1.4 times that
 constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
 constexpr float pull_forgotten_K = most_pull_K / 1200.0f * dt_s;  // in 20 min, as slowly as an ambient drifts
 

@@ -10,9 +10,9 @@
 // with a reading is the estimator's. No heap; same cost every call. Not for an ISR.
 #pragma once
 
-namespace thermal {
+#include "thermal/heat_set.hpp"
 
-inline constexpr double estimator_dt_s = 0.01;
+namespace thermal {
 
 inline constexpr float least_gate_K = 5.0f;  // safety table: what no sensor may lower the estimate by
 inline constexpr float gate_sigmas = 4.0f;   // one of a good sensor's readings in 30,000 is colder by more
@@ -45,8 +45,6 @@ class HousingWatch {
     float counts_as_above_K;  // how much more than the model's it is taken for
     float most_down_K;        // how far it may lower a winding
   };
-
-  explicit HousingWatch(float model_degC = 0.0f) : model_degC_(model_degC) {}
 
   /// First in each step: what the model says that the sensor reads now. Only that moves the model; corrections are told
   /// by model_corrected, and where it begins anew by model_jumped.
@@ -92,7 +90,7 @@ class HousingWatch {
   int met_ = 0;  // means that counted without limit
 
   // How far both moved in about two minutes: each against a mean of itself that forgets as fast.
-  float model_degC_, model_moved_K_ = 0.0f;
+  float model_degC_ = 0.0f, model_moved_K_ = 0.0f;
   float reading_slow_degC_ = 0.0f, reading_moved_K_ = 0.0f;
 
   float pulled_K_ = 0.0f;  // forgotten slowly
