@@ -43,6 +43,8 @@ enum class Drive : std::uint8_t {
   count
 };
 constexpr bool is_current_square(Drive drive) { return drive >= Drive::phase_a_A2 && drive <= Drive::current_A2; }
+/// The square of the current in phase k, 0..2.
+constexpr Drive phase_drive(int k) { return static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k); }
 inline constexpr int drive_count = static_cast<int>(Drive::count);
 
 enum class LinkLaw : std::uint8_t {
