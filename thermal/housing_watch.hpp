@@ -64,8 +64,8 @@ class HousingWatch {
   void know_housing(double ambient_degC);
   bool housing_known() const { return housing_known_; }
 
-  /// Of a full mean of a known housing. `sigma_K` of the difference; `kept_K`: how much hotter than believed the model
-  /// may be, with the sensor none the worse.
+  /// Of a full mean of a known housing. `sigma_K` of the difference; `kept_K`: by how much the model may be too hot
+  /// with the sensor none the worse; `ambient_degC` is trusted if the sensor lives.
   Verdict judge(float above_model_K, float sigma_K, float kept_K, double ambient_degC);
   /// What a believed mean lowered the windings by; negative if it raised them: noise up and down cancels.
   void note_pull(float down_K);

@@ -70,11 +70,12 @@ class Uncertainty {
   /// What one step makes of a small difference of the states.
   Matrix step_matrix(const HeatNetwork<double>& network, const Transition<double>& transition,
                      const HeatNetwork<double>::Rates& rates) const;
+  /// `ambient_drifts`: a housing is heard that shows where it went.
   void step(const Matrix& step_matrix, bool ambient_drifts);
   /// The sensor, `behind_K` behind its housing, went `moved_K` of that in this step.
   void step_lag(double behind_K, double moved_K);
 
-  /// By how much the states follow each kelvin of it, parameters not; false if that cannot be said.
+  /// By how much the states follow each kelvin of above_K, parameters not; false if that cannot be said.
   bool gain(const Sight& seen, Row& gain) const;
   /// The states did so (Joseph form: any gain will do).
   void follow(const Sight& seen, const Row& gain);
@@ -105,7 +106,7 @@ class Uncertainty {
   float ambient_sigma_K_;
   bool has_limit_[max_nodes];  // windings, and what else may not become too hot
 
-  Matrix p_;
+  Matrix p_;  // covariance of the states
   // The lag that nobody told is one more error that is never learned. What it shares with the states is kept apart from
   // p_: sigma^2 is p_(i, i) + late_shared_K_[i]^2.
   Row late_shared_K_;  // how much colder the states were made, per sigma of it
