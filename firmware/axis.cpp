@@ -146,7 +146,9 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   if (!guard_.passes(pulses.ratio)) return trip(guard_.found());
 
   trace_.note(current_A, permitted.current_A, asked_V, pulses.share, sample.bus_V, permitted.reason);
-  return last_ = {pulses.ratio, true};
+  last_.ratio = pulses.ratio;
+  last_.on = true;
+  return last_;
 }
 
 /// Adds what one sample says; the periods that were missed before it are charged first, hotter.
