@@ -363,11 +363,10 @@ thermal::Unseen Axis::unseen_now() const {
   const Dq i_A = trace_.current_A;
   const thermal::Chord chord = thermal::chord_of(turn_rad);
   const float vector_A2 = i_A.d * i_A.d + i_A.q * i_A.q;
-  const thermal::Unseen within =
-      thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
-                      phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
-                      {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
-  return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
+  const thermal::Unseen rest = thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
+                                               phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
+                                               {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
+  return {rest.of_mean_A2 + vector_A2 * chord.of_mean, rest.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 
 /// The same of the last step, the mean of its looks: one alone would hide up to a seventh of the heat of a demand that

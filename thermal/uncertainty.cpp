@@ -112,13 +112,13 @@ Uncertainty::Matrix Uncertainty::step_matrix(const HeatNetwork<double>& network,
   const auto column = [&](int index, const Vec& rate) { f.col(index).head(n_) = phi1.lazyProduct(rate); };
   column(ambient(), network.boundary_gain_per_s(Boundary::ambient).cast<float>());
   // A winding whose capacity is off warms and cools at another rate, and the housing gets no more for it.
-  Vec warming = (rates.sources + rates.inner + rates.outer).cast<float>();
+  Vec warming_K_per_s = (rates.sources_K_per_s + rates.inner_K_per_s + rates.outer_K_per_s).cast<float>();
   for (int i = 0; i < n_; ++i) {
-    if (!has_limit_[i]) warming[i] = 0.0f;
+    if (!has_limit_[i]) warming_K_per_s[i] = 0.0f;
   }
-  column(power(), warming);
-  column(inner(), rates.inner.cast<float>());
-  column(cooling(), rates.outer.cast<float>());
+  column(power(), warming_K_per_s);
+  column(inner(), rates.inner_K_per_s.cast<float>());
+  column(cooling(), rates.outer_K_per_s.cast<float>());
   const float take = 1.0f / (1.0f + static_cast<float>(housing_.lag_s) / dt_f);
   f.row(sensor()) = f.row(housing_.node) * (take * (1.0f + static_cast<float>(housing_.gain_error)));
   f(sensor(), sensor()) = 1.0f - take;
