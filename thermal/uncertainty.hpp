@@ -104,7 +104,7 @@ class Uncertainty {
   HousingSensor<double> housing_;
   Trust trust_;
   float ambient_sigma_K_;
-  bool has_limit_[max_nodes];  // windings, and what else may not become too hot
+  bool has_limit_[max_nodes] = {};  // windings, and what else may not become too hot
 
   Matrix p_;  // covariance of the states
   // The lag that nobody told is one more error that is never learned. What it shares with the states is kept apart from
