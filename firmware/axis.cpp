@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "thermal/indices.hpp"
 #include "thermal/validate.hpp"
 
 namespace firmware {
@@ -147,7 +146,9 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   if (!guard_.passes(pulses.ratio)) return trip(guard_.found());
 
   trace_.note(current_A, permitted.current_A, asked_V, pulses.share, sample.bus_V, permitted.reason);
-  return last_ = {pulses.ratio, true};
+  last_.ratio = pulses.ratio;
+  last_.on = true;
+  return last_;
 }
 
 /// Adds what one sample says; the periods that were missed before it are charged first, hotter.
@@ -362,11 +363,10 @@ thermal::Unseen Axis::unseen_now() const {
   const Dq i_A = trace_.current_A;
   const thermal::Chord chord = thermal::chord_of(turn_rad);
   const float vector_A2 = i_A.d * i_A.d + i_A.q * i_A.q;
-  const thermal::Unseen within =
-      thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
-                      phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
-                      {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
-  return {within.of_mean_A2 + vector_A2 * chord.of_mean, within.of_heat_A2 + vector_A2 * chord.of_heat};
+  const thermal::Unseen rest = thermal::unseen(trace_.ended, phases({i_A.d * chord.middle, i_A.q * chord.middle}),
+                                               phases({-thermal::bow_of(turn_rad, flux_Wb_, inductance_H_), 0.0f}),
+                                               {trace_.bus_V, phase_ohm, inductance_H_, pwm_Hz_, rating_.dead_time_s});
+  return {rest.of_mean_A2 + vector_A2 * chord.of_mean, rest.of_heat_A2 + vector_A2 * chord.of_heat};
 }
 
 /// The same of the last step, the mean of its looks: one alone would hide up to a seventh of the heat of a demand that
@@ -394,8 +394,8 @@ void Axis::add_contradicted(float (&phase_A2)[3]) const {
   }
 }
 
-/// Means over the step; speed and mode are taken as they stand. No sample at all: what went
-/// on before, as long as the bridge is on.
+/// Means over the step; speed and mode are taken as they stand. No sample at all: what went on before, as long as the
+/// bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
   const thermal::Unseen looked = take_unseen();
@@ -403,28 +403,9 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
     if (mode_ == Mode::running) return input_;
     unseen_ = {};
   } else {
-    const float share = 1.0f / static_cast<float>(sums.periods);
-    const float enabled = mode_ == Mode::running ? 1.0f : 0.0f;
     unseen_ = looked;
-    float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
-    add_contradicted(phase_A2);
-    // What a sample misses of the mean goes with the phase's own current, ripple through all of them.
-    const float all_A2 = phase_A2[0] + phase_A2[1] + phase_A2[2];
-    const float missed = all_A2 > 0.0f ? 1.5f * unseen_.of_mean_A2 / all_A2 : 0.0f;
-    const float ripple_A2 = 0.5f * (unseen_.of_heat_A2 - (all_A2 > 0.0f ? unseen_.of_mean_A2 : 0.0f));
-    double sampled_A2 = 0.0, vector_A2 = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      const float phase = towards_hot * (phase_A2[k] * (1.0f + missed) + ripple_A2);
-      const double one_A2 =
-          static_cast<double>(phase < 0.0f ? 0.0f : phase);  // NaN stays, and is replaced by something hot
-      input.drive[static_cast<int>(thermal::Drive::phase_a_A2) + k] = one_A2;
-      sampled_A2 += static_cast<double>(phase_A2[k]) / 1.5;
-      vector_A2 += one_A2 / 1.5;
-    }
-    input[thermal::Drive::current_A2] = vector_A2;
-    const double mean_A2 = sampled_A2 + static_cast<double>(unseen_.of_mean_A2);
-    input[thermal::Drive::current_A] = std::sqrt(mean_A2 < 0.0 ? 0.0 : mean_A2);
-    input[thermal::Drive::enabled] = static_cast<double>(enabled);
+    fill_currents(input, sums);
+    input[thermal::Drive::enabled] = mode_ == Mode::running ? 1.0 : 0.0;
     thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }
   input[thermal::Drive::one] = 1.0;
@@ -434,6 +415,28 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   input[thermal::Boundary::frame] = around_degC;
   input[thermal::Boundary::neighbour] = around_degC;
   return input;
+}
+
+/// By phase and in all, what their samples did not show included.
+void Axis::fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) const {
+  const float share = 1.0f / static_cast<float>(sums.periods);
+  float phase_A2[3] = {sums.phase_A2.a * share, sums.phase_A2.b * share, sums.phase_A2.c * share};
+  add_contradicted(phase_A2);
+  // What a sample misses of the mean goes with the phase's own current, ripple through all of them.
+  const float all_A2 = phase_A2[0] + phase_A2[1] + phase_A2[2];
+  const float missed = all_A2 > 0.0f ? 1.5f * unseen_.of_mean_A2 / all_A2 : 0.0f;
+  const float ripple_A2 = 0.5f * (unseen_.of_heat_A2 - (all_A2 > 0.0f ? unseen_.of_mean_A2 : 0.0f));
+  double sampled_A2 = 0.0, vector_A2 = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const float heats_A2 = towards_hot * (phase_A2[k] * (1.0f + missed) + ripple_A2);
+    const double one_A2 = static_cast<double>(heats_A2 < 0.0f ? 0.0f : heats_A2);  // NaN stays: something hot follows
+    input[thermal::phase_drive(k)] = one_A2;
+    sampled_A2 += static_cast<double>(phase_A2[k]) / 1.5;
+    vector_A2 += one_A2 / 1.5;
+  }
+  input[thermal::Drive::current_A2] = vector_A2;
+  const double mean_A2 = sampled_A2 + static_cast<double>(unseen_.of_mean_A2);
+  input[thermal::Drive::current_A] = std::sqrt(mean_A2 < 0.0 ? 0.0 : mean_A2);
 }
 
 /// What the whole steps that stand for it are charged with.
@@ -487,7 +490,7 @@ void Axis::publish() {
   for (int k = winding; k > 0 && k < 3; ++k) state.core_degC[k] = state.core_degC[winding - 1];
   state.housing_degC = static_cast<float>(now.housing_degC);
   state.unseen = unseen_;
-  state.heating_A = static_cast<float>(thermal::direct_A(std::sqrt(input_[thermal::Drive::current_A2])));
+  state.heating_A = static_cast<float>(wire::direct_per_amplitude * std::sqrt(input_[thermal::Drive::current_A2]));
   state.allowance_A = allowance_.current_A;
   state.limit = state.fast.limit;
   state.estimate_flags = now.flags;

@@ -187,6 +187,7 @@ class Axis {
   [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
+  void fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) const;
   thermal::HeatInput<> charged(thermal::HeatInput<> input) const;
   thermal::Unseen unseen_now() const;
   thermal::Unseen take_unseen();

@@ -18,7 +18,7 @@ class CurrentLoop {
   CurrentLoop() = default;
   CurrentLoop(const AxisParameters& p, const BoardRating& rating)
       : inductance_d_H_(p.inductance_d_H), inductance_q_H_(p.inductance_q_H), flux_linkage_Wb_(p.flux_linkage_Wb) {
-    const float bandwidth_rad_per_s = 2.0f * 3.14159265f * p.current_bandwidth_Hz;
+    const float bandwidth_rad_per_s = 2.0f * pi * p.current_bandwidth_Hz;
     kp_d_V_per_A_ = p.inductance_d_H * bandwidth_rad_per_s;
     kp_q_V_per_A_ = p.inductance_q_H * bandwidth_rad_per_s;
     ki_V_per_A_ = p.phase_resistance_ohm * bandwidth_rad_per_s / rating.pwm_Hz;

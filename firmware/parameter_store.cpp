@@ -64,11 +64,6 @@ bool untouched(const AxisSet& set) {
   return true;
 }
 
-wire::Answer refused(wire::Status why, int axis, std::uint16_t id) {
-  return {static_cast<std::uint8_t>(why), static_cast<std::uint8_t>(axis), id};
-}
-wire::Answer refused(wire::Status why) { return {static_cast<std::uint8_t>(why)}; }
-
 /// The first thing wrong with one axis: a contradiction before a missing value, electrical before thermal.
 Finding finding_of(const AxisSet& set, const BoardRating& rating) {
   const Finding drive = validate(set.drive, rating);
@@ -110,7 +105,8 @@ wire::Answer check(const ParameterSet& set, const BoardRating& rating) {
     if (untouched(set.axes[axis])) continue;
     const Finding found = finding_of(set.axes[axis], rating);
     if (found.id == 0) continue;
-    return refused(found.missing ? wire::Status::parameters_unset : wire::Status::parameter_refused, axis, found.id);
+    const auto why = found.missing ? wire::Status::parameters_unset : wire::Status::parameter_refused;
+    return wire::refused(why, static_cast<std::uint8_t>(axis), found.id);
   }
   return {};
 }
@@ -123,11 +119,12 @@ wire::Status ParameterStore::get(const wire::Address& of, float& value) const {
 }
 
 wire::Answer ParameterStore::stage(const wire::Assignment& one) {
-  const int index = index_of(one.address.id), axis = one.address.axis;
-  if (index < 0 || axis >= axis_count) return refused(wire::Status::unknown_parameter, axis, one.address.id);
+  const auto& [id, axis, zero] = one.address;
+  const int index = index_of(id);
+  if (index < 0 || axis >= axis_count) return wire::refused(wire::Status::unknown_parameter, axis, id);
   const wire::ParameterInfo& info = *parameter_info(index);
   const bool taken_back = wire::is_unset(one.value) && wire::is_unset(info.fallback);
-  if (!taken_back && !info.holds(one.value)) return refused(wire::Status::parameter_refused, axis, one.address.id);
+  if (!taken_back && !info.holds(one.value)) return wire::refused(wire::Status::parameter_refused, axis, id);
   field(staged_.axes[axis], index) = one.value;
   return {};
 }
@@ -150,7 +147,7 @@ wire::Answer ParameterStore::load(wire::LoadFrom from) {
 }
 
 wire::Answer ParameterStore::commit(Driver& driver) {
-  if (!driver.at_rest()) return refused(wire::Status::not_disarmed);
+  if (!driver.at_rest()) return wire::refused(wire::Status::not_disarmed);
   const wire::Answer against = check(staged_, rating_);
   if (against.status != 0) return against;
   for (int i = 0; i < axis_count; ++i) {
@@ -162,7 +159,7 @@ wire::Answer ParameterStore::commit(Driver& driver) {
 }
 
 wire::Answer ParameterStore::against_saving(const Driver& driver) const {
-  if (!driver.at_rest()) return refused(wire::Status::not_disarmed);
+  if (!driver.at_rest()) return wire::refused(wire::Status::not_disarmed);
   return check(in_force_, rating_);
 }
 
@@ -191,19 +188,19 @@ void ParameterStore::encode(Record& record) const {
 wire::Answer ParameterStore::decode(ParameterSet& set) const {
   set = {};
   const std::span<const std::uint8_t> payload = log_.newest().payload;
-  if (payload.empty()) return refused(wire::Status::nothing_saved);
+  if (payload.empty()) return wire::refused(wire::Status::nothing_saved);
   std::uint32_t head[2] = {};
   if (payload.size() >= sizeof head) std::memcpy(head, payload.data(), sizeof head);
   const std::size_t count = head[1];
   const std::size_t ids_at = sizeof head, values_at = ids_at + (count + 1) / 2 * 4;
   if (head[0] != version || count > slot_bytes || payload.size() != values_at + 4 * axis_count * count)
-    return refused(wire::Status::newer_record);
+    return wire::refused(wire::Status::newer_record);
   ParameterSet read;
   for (std::size_t k = 0; k < count; ++k) {
     std::uint16_t id;
     std::memcpy(&id, payload.data() + ids_at + 2 * k, sizeof id);
     const int index = index_of(id);
-    if (index < 0) return refused(wire::Status::newer_record, wire::no_axis, id);
+    if (index < 0) return wire::refused(wire::Status::newer_record, wire::no_axis, id);
     for (std::size_t axis = 0; axis < axis_count; ++axis)
       std::memcpy(&field(read.axes[axis], index), payload.data() + values_at + 4 * (axis * count + k), 4);
   }

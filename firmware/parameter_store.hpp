@@ -83,9 +83,9 @@ class ParameterStore {
       case RecordLog::Written::done:
         return {};
       case RecordLog::Written::no_room:
-        return {static_cast<std::uint8_t>(wire::Status::no_room)};
+        return wire::refused(wire::Status::no_room);
       default:
-        return {static_cast<std::uint8_t>(wire::Status::not_written)};
+        return wire::refused(wire::Status::not_written);
     }
   }
 

@@ -2,8 +2,8 @@
 // Copies signals at the pace of the PWM: a stream of rows for telemetry (decimated, drops counted) and one triggered
 // capture with rows from before the trigger. A row is its PWM period followed by the words that its places held.
 //
-// `tick` is for the control interrupt, once a PWM period, after the ticks of both axes. It costs 4 instructions while
-// nobody listens and 56 with four signals on their way to the host, each further one 5 (ctest --preset qemu-m4f -R
+// `tick` is for the control interrupt, once a PWM period, after the ticks of both axes. It costs 5 instructions while
+// nobody listens and 57 with four signals on their way to the host, each further one 5 (ctest --preset qemu-m4f -R
 // instructions -V). Everything else is for one lower context, which the interrupt may break into at any place: what it
 // sees is switched on last and off first. No locks, no heap.
 #pragma once

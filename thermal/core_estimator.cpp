@@ -10,67 +10,36 @@ namespace thermal {
 namespace {
 
 constexpr double dt_s = estimator_dt_s;
-constexpr float dt_f = static_cast<float>(estimator_dt_s);
 
 // Between these a temperature can be true; outside them the arithmetic or the memory is broken.
 constexpr double coldest_degC = -60.0, hottest_possible_degC = 1000.0;
-// A thermistor chain that is alive reads within these (both rails of the divider lie far outside).
-constexpr float coldest_reading_degC = -40.0f, hottest_reading_degC = 200.0f;
+constexpr int most_lost_steps = 200;        // 2 s: no watchdog waits longer
+constexpr float most_follow = 1.4f;         // K of a winding by which copper follows a kelvin of its housing
+constexpr float restored_hotter_K = 10.0f;  // than the last good state, when there is none: chosen
+constexpr float known_sigma_K = 3.0f;       // of a housing that is known: from here on its sensor pulls little; chosen
+constexpr float soaked_within_K = 1.0f;     // of the housing: what a start that believes it may be off
+constexpr float unknown_below_K = 10.0f;    // safety table: limit minus 10 K until probed
 
-constexpr int window_steps = 50;           // the housing is heard twice a second: faster only averages its noise
-constexpr int missing_steps = 10;          // 100 ms without a reading: safety table, NTC open or short
-constexpr int slow_window_steps = 200;     // a sensor that needs longer to fill a window is no better than none: chosen
-constexpr int most_lost_steps = 200;       // 2 s: no watchdog waits longer
-constexpr float most_follow = 1.4f;        // K of a winding by which copper follows a kelvin of its housing
-constexpr float most_pull_K = 3.5f;        // safety table: never lowered by more than 5 K, over most_follow
-constexpr float suspicious_pull_K = 0.3f;  // lowered by less, a stuck sensor does little harm: chosen
-constexpr float least_gate_K = 5.0f;       // safety table: what no sensor may lower the estimate by
-constexpr float gate_sigmas = 4.0f;        // one of a good sensor's readings in 30,000 is colder by more
-constexpr float unheard_sigma_K = 3.0f;  // that housing and ambient are less known by, once nothing tells them; chosen
-constexpr float pull_forgotten_K_per_s = most_pull_K / 1200.0f;  // as slowly as an ambient drifts (below)
-constexpr float movement_memory_s = 120.0f;  // safety table: stuck or detached is found within that load
-// Of what the model expects: a sensor that comes off by half is not alive. Above 0.7 honest sensors fail as well, on
-// motors that their sheet does not fit (at 0.9 these lose a tenth of their A^2 s, at 0.7 a hundredth).
-constexpr float enough_movement_K = 3.0f, alive_share = 0.7f, stuck_share = 0.25f;
-// A reading that falls by twice what the model does, and by this more, has come off a motor that cools: chosen; a motor
-// of 60 K above a frost that its model does not know of falls by as much more in two minutes.
-constexpr float off_share = 2.0f, off_K = 10.0f;
-constexpr float start_sigma_K = 15.0f, most_sigma_K = 100.0f;  // the latter as it is kept: more says no more
-constexpr float restored_hotter_K = 10.0f;
-constexpr float acquired_sigma_K = 3.0f;  // of a housing that is known: from here on its sensor pulls little; chosen
-constexpr int acquired_readings = 120;    // a minute: what a start without memory takes to prove itself
-constexpr float soaked_within_K = 1.0f;   // of the housing: what a start that believes it may be off
-constexpr float unknown_below_K = 10.0f;  // safety table: limit minus 10 K until probed
-
-// Drift of the ambient: 10 K in 20 min, at most 10 K off while it is observed; it also takes up cooling that differs
-// from the sheet's. Of any node: 0.1 K in a second's square root, what no parameter explains.
-constexpr float ambient_walk_K2_per_s = 100.0f / 1200.0f, ambient_worst_K = 10.0f, node_walk_K2_per_s = 1e-2f;
-
-// One sigma of what a housing sensor may lag beside what was told, where only the sheet is known; in proportion less
-// where the trust says that more is. Glued or potted ones lag 10..60 s, and the rms of anything up to 60 s is 35 s.
-constexpr double untold_lag_s = 35.0, told_lag_share = 0.5;  // the latter, of what was told: chosen
+constexpr float no_bound_K = std::numeric_limits<float>::infinity();
 
 float squared(float x) { return x * x; }
 
 bool plausible(double degC) { return degC > coldest_degC && degC < hottest_possible_degC; }  // false for NaN
 
+/// Of the nodes that have a limit; NaN counts as the hottest.
+template <class T>
+T hottest(const Estimate& estimate, const T (&degC)[max_nodes]) {
+  T hottest = -std::numeric_limits<T>::infinity();
+  for (int i = 0; i < estimate.node_count; ++i) {
+    if (std::isfinite(estimate.max_degC[i]) && !(degC[i] <= hottest)) hottest = degC[i];
+  }
+  return hottest;
+}
+
 }  // namespace
 
-float Estimate::hottest_margin_degC() const {
-  float hottest = -std::numeric_limits<float>::infinity();
-  for (int i = 0; i < node_count; ++i) {
-    if (std::isfinite(max_degC[i]) && !(margin_degC[i] <= hottest)) hottest = margin_degC[i];
-  }
-  return hottest;
-}
-
-double Estimate::hottest_degC() const {
-  double hottest = -std::numeric_limits<double>::infinity();
-  for (int i = 0; i < node_count; ++i) {
-    if (std::isfinite(max_degC[i]) && !(degC[i] <= hottest)) hottest = degC[i];
-  }
-  return hottest;
-}
+float Estimate::hottest_margin_degC() const { return hottest(*this, margin_degC); }
+double Estimate::hottest_degC() const { return hottest(*this, degC); }
 
 CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings& settings)
     : network_(set),
@@ -78,44 +47,24 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
       settings_(settings),
       housing_(set.housing),
       n_(set.node_count),
+      uncertainty_(set, settings.trust, settings.ambient_sigma_K),
       ambient_degC_(static_cast<double>(settings.ambient_degC)) {
-  for (int i = 0; i < n_; ++i) max_degC_[i] = set.nodes[i].max_degC;
-  degC_ = Vector::Constant(n_, ambient_degC_);
-  good_degC_ = degC_;
+  for (int i = 0; i < n_; ++i) {
+    max_degC_[i] = set.nodes[i].max_degC;
+    if (has_limit(i)) ++limited_nodes_;
+  }
+  degC_ = good_degC_ = Vector::Constant(n_, ambient_degC_);
   good_ambient_degC_ = ambient_degC_;
-  sensor_degC_ = sensed_degC(ambient_degC_);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);  // to begin is no movement
   input_[Boundary::ambient] = ambient_degC_;
   for (Boundary b : {Boundary::coolant, Boundary::frame, Boundary::neighbour}) input_[b] = ambient_degC_;
-  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
-  const double doubt = static_cast<double>(settings.trust.inner_resistance / sheet_trust.inner_resistance);
-  const double late_s = doubt * (housing_.lag_s > 0.0 ? told_lag_share * housing_.lag_s : untold_lag_s);
-  late_take_ = dt_s / (dt_s + housing_.lag_s + late_s);
-  widen_all();
-  soak();
+  doubted_K_.setZero(uncertainty_.size());
+  kept_K_.setZero(uncertainty_.size());
+  settle_sensor();
+  uncertainty_.soak();
   publish();
 }
 
-/// Whatever the housing turns out to be, the winding is too.
-void CoreEstimator::soak() {
-  p_.topLeftCorner(n_, n_).setConstant(squared(start_sigma_K));
-  p_.row(sensor()) = p_.row(housing_.node);
-  p_.col(sensor()) = p_.col(housing_.node);
-  p_(sensor(), sensor()) = squared(start_sigma_K);
-}
-
-/// Nothing is known about the temperatures but the state itself; the parameters stay what the trust says.
-void CoreEstimator::widen_all() {
-  p_ = Covariance::Zero(n_ + 5, n_ + 5);
-  late_shared_K_ = Row::Zero(n_ + 5);
-  for (int i = 0; i < n_; ++i) p_(i, i) = squared(start_sigma_K);
-  p_(ambient(), ambient()) = squared(settings_.ambient_sigma_K);
-  p_(sensor(), sensor()) = squared(start_sigma_K);
-  const float trust[3] = {settings_.trust.power, settings_.trust.inner_resistance, settings_.trust.cooling};
-  for (int i = 0; i < 3; ++i) p_(n_ + 2 + i, n_ + 2 + i) = squared(trust[i]);
-  // The states are power over capacity and conductance: both signs turned.
-  p_(n_ + 2, n_ + 3) = p_(n_ + 3, n_ + 2) = settings_.trust.correlation * trust[0] * trust[1];
-}
+// ---- one step ------------------------------------------------------------------------------------------------------
 
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
                                     int lost_steps) {
@@ -124,10 +73,9 @@ const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, R
   if (lost_steps > 0) {
     flags_ |= lost_time;
     for (int i = 0; i < lost_steps && i < most_lost_steps; ++i) step();
-    if (lost_steps > most_lost_steps) raise_to(static_cast<float>(hottest_limit_degC()) - unknown_below_K);
+    if (lost_steps > most_lost_steps) raise_to(static_cast<float>(lowest_limit_degC()) - unknown_below_K);
   }
-  ambient_known_ = measured_ambient.valid && measured_ambient.value > coldest_reading_degC &&
-                   measured_ambient.value < hottest_reading_degC;
+  ambient_known_ = measured_ambient.usable();
   if (ambient_known_) ambient_degC_ = static_cast<double>(measured_ambient.value);
   step();
   hear_housing(housing);
@@ -164,13 +112,23 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
 
 void CoreEstimator::step() {
   input_[Boundary::ambient] = ambient_degC_;
-  propagate_covariance(network_.rates(degC_, input_));
+  step_uncertainty();
   degC_ = network_.step(transition_, degC_, input_);
-  const double target = sensed_degC(degC_[housing_.node]);
-  const double moved_K = (target - sensor_degC_) / (1.0 + housing_.lag_s / dt_s);
-  late_K_ += moved_K - late_take_ * (target - sensor_degC_ + late_K_);
+  const double behind_K = sensed_degC(degC_[housing_.node]) - sensor_degC_;
+  const double moved_K = behind_K / (1.0 + housing_.lag_s / dt_s);
+  uncertainty_.step_lag(behind_K, moved_K);
   sensor_degC_ += moved_K;
 }
+
+void CoreEstimator::step_uncertainty() {
+  const auto f = uncertainty_.step_matrix(network_, transition_, network_.rates(degC_, input_));
+  uncertainty_.step(f, watch_.housing_known());
+  if (ambient_known_) uncertainty_.know_ambient();
+  doubted_K_ = f.lazyProduct(doubted_K_).eval();
+  kept_K_ = f.lazyProduct(kept_K_).eval();
+}
+
+// ---- the housing sensor --------------------------------------------------------------------------------------------
 
 /// What the sensor reads of a housing that has been as warm as this for long, and the other way round.
 double CoreEstimator::sensed_degC(double housing_degC) const {
@@ -180,88 +138,19 @@ double CoreEstimator::housing_of_degC(double sensed_degC) const {
   return (sensed_degC + 25.0 * housing_.gain_error - housing_.offset_K) / (1.0 + housing_.gain_error);
 }
 
-/// P = F P F' + Q with F = [phi0, phi1 d(rate)/d(ambient, parameters); 0, 1], and the sensor's lag as a row of its own.
-/// What the untold lag shares with the states moves with them.
-void CoreEstimator::propagate_covariance(const HeatNetwork<double>::Rates& rates) {
-  const int size = n_ + 5;
-  using Mat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, max_nodes, max_nodes>;
-  using Vec = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_nodes, 1>;
-  const Mat phi1 = transition_.phi1.cast<float>();
-  Covariance f = Covariance::Identity(size, size);
-  Mat nodes = transition_.phi0.cast<float>();
-  const Vec slope = rates.source_slope_per_s.cast<float>();
-  for (int i = 0; i < n_; ++i) nodes.col(i) += phi1.col(i) * slope[i];  // hot copper heats more
-  f.topLeftCorner(n_, n_) = nodes;
-  const auto column = [&](int index, const Vec& rate) { f.col(index).head(n_) = phi1.lazyProduct(rate); };
-  column(ambient(), network_.boundary_gain_per_s(Boundary::ambient).cast<float>());
-  // A winding whose capacity is off warms and cools at another rate, and the housing gets no more for it.
-  Vec warming = (rates.sources + rates.inner + rates.outer).cast<float>();
-  for (int i = 0; i < n_; ++i) {
-    if (!std::isfinite(max_degC_[i])) warming[i] = 0.0f;
-  }
-  column(n_ + 2, warming);
-  column(n_ + 3, rates.inner.cast<float>());
-  column(n_ + 4, rates.outer.cast<float>());
-  const float take = 1.0f / (1.0f + static_cast<float>(housing_.lag_s) / dt_f);
-  f.row(sensor()) = f.row(housing_.node) * (take * (1.0f + static_cast<float>(housing_.gain_error)));
-  f(sensor(), sensor()) = 1.0f - take;
-
-  const Covariance fp = f.lazyProduct(p_);
-  p_ = fp.lazyProduct(f.transpose());
-  late_shared_K_ = f.lazyProduct(late_shared_K_).eval();
-  doubted_K_ = f.lazyProduct(doubted_K_).eval();
-  kept_K_ = f.lazyProduct(kept_K_).eval();
-  for (int i = 0; i < n_; ++i) p_(i, i) += node_walk_K2_per_s * dt_f;
-  if (heard_.acquired && p_(ambient(), ambient()) < squared(ambient_worst_K))
-    p_(ambient(), ambient()) += ambient_walk_K2_per_s * dt_f;
-  if (ambient_known_) {
-    p_.row(ambient()).setZero();
-    p_.col(ambient()).setZero();
-    late_shared_K_[ambient()] = 0.0f;
-    p_(ambient(), ambient()) = 1.0f;  // a sensor beside the motor is good to 1 K
-  }
-}
-
-/// Gathers half a second of readings, watches whether they move as the model does, and then lets them correct.
 void CoreEstimator::hear_housing(Reading housing) {
-  const float leak = dt_f / movement_memory_s;
-  const float sensor_degC = static_cast<float>(sensor_degC_) - kept_K_[sensor()];
-  heard_.model_moved_K += sensor_degC - last_sensor_degC_ - leak * heard_.model_moved_K;
-  last_sensor_degC_ = sensor_degC;
+  watch_.model_moved(static_cast<float>(sensor_degC_) - kept_K_[sensor()]);
   settle(1);
-  heard_.pulled_K =
-      heard_.pulled_K > pull_forgotten_K_per_s * dt_f ? heard_.pulled_K - pull_forgotten_K_per_s * dt_f : 0.0f;
-
-  const bool usable = housing.valid && housing.value > coldest_reading_degC && housing.value < hottest_reading_degC;
-  if (heard_.unheard < slow_window_steps) ++heard_.unheard;
-  if (!usable && heard_.silent < missing_steps) ++heard_.silent;
-  if (usable) heard_.silent = 0;
-  if ((heard_.silent == missing_steps || heard_.unheard == slow_window_steps) && !(flags_ & housing_missing)) {
-    flags_ |= housing_missing;
-    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
-    p_(ambient(), ambient()) += squared(unheard_sigma_K);
-  }
-  if (heard_.silent == missing_steps) {
-    window_ = 0;
-    reading_sum_ = sensor_sum_ = 0.0;
-  }
-  if (!usable) return;
-  reading_sum_ += static_cast<double>(housing.value);
-  sensor_sum_ += sensor_degC_ + static_cast<double>(due_K_[sensor()]);  // as if it had all flowed in
-  if (++window_ < window_steps) return;
-
-  const float reading_degC = static_cast<float>(reading_sum_ / window_);
-  const float innovation_K = static_cast<float>((reading_sum_ - sensor_sum_) / window_);
-  if (heard_.unheard < slow_window_steps) flags_ &= ~static_cast<std::uint32_t>(housing_missing);
-  window_ = heard_.unheard = 0;
-  reading_sum_ = sensor_sum_ = 0.0;
-  const bool first = !heard_.read;
-  if (first) heard_.reading_slow_degC = reading_degC;
-  heard_.read = true;
-  if (!heard_.acquired) believe_ambient_below(housing_of_degC(static_cast<double>(reading_degC)));
-  heard_.reading_slow_degC += (reading_degC - heard_.reading_slow_degC) * (window_steps * leak);
-  heard_.reading_moved_K = reading_degC - heard_.reading_slow_degC;
-  correct_by_housing(reading_degC, innovation_K, first);
+  const auto heard = watch_.hear(housing, sensor_degC_ + static_cast<double>(due_K_[sensor()]));
+  if (heard.fell_silent) uncertainty_.lose_surroundings();
+  if (!heard.full) return;
+  if (!watch_.housing_known()) believe_ambient_below(housing_of_degC(static_cast<double>(heard.reading_degC)));
+  if (heard.first && resumed_ && housing_.lag_s > 0.0)
+    meet_sensor(heard.reading_degC);
+  else if (watch_.housing_known())
+    follow_housing(heard.above_model_K);
+  else
+    meet_housing(heard.reading_degC, heard.above_model_K);
 }
 
 /// The ambient is hardly warmer than a soaked housing, and believed no colder than a room.
@@ -272,12 +161,8 @@ void CoreEstimator::believe_ambient_below(double housing_degC) {
 /// The first reading of a sensor that lags says where the sensor is; the next, by how it moves, where the housing is.
 void CoreEstimator::meet_sensor(float reading_degC) {
   sensor_degC_ = static_cast<double>(reading_degC);
-  last_sensor_degC_ = reading_degC - kept_K_[sensor()];
-  p_.row(sensor()).setZero();
-  p_.col(sensor()).setZero();
-  late_shared_K_[sensor()] = 0.0f;
-  late_K_ = 0.0;
-  p_(sensor(), sensor()) = squared(settings_.housing_noise_K);
+  watch_.model_jumped(reading_degC - kept_K_[sensor()]);
+  uncertainty_.know_sensor(settings_.housing_noise_K);
   raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
@@ -286,158 +171,61 @@ void CoreEstimator::meet_sensor(float reading_degC) {
 void CoreEstimator::doubt(float left_K) {
   degC_.array() -= static_cast<double>(left_K);
   sensor_degC_ -= static_cast<double>(left_K);
-  last_sensor_degC_ -= left_K;
+  watch_.model_corrected(-left_K);
   doubted_K_.head(n_).array() += left_K;
   doubted_K_[sensor()] += left_K;
 }
 
-void CoreEstimator::correct_by_housing(float reading_degC, float innovation_K, bool first) {
-  Row seen = Row::Zero(n_ + 5);
-  seen[sensor()] = 1.0f;
-  const float noise = squared(settings_.housing_noise_K);
-  const float late_K = static_cast<float>(late_K_);
-  if (first && resumed_ && housing_.lag_s > 0.0) return meet_sensor(reading_degC);
-  if (!heard_.acquired) {
-    const Vector before_degC = degC_;
-    if (!correct(seen, innovation_K, noise, late_K, std::numeric_limits<float>::infinity(), 1)) return;
-    const int h = housing_.node;
-    heard_.acquired =
-        p_(h, h) + squared(late_shared_K_[h]) < squared(acquired_sigma_K) || ++heard_.met >= acquired_readings;
-    heard_.trusted_ambient_degC = ambient_degC_;
-    // After a reset the winding does not follow the housing by itself.
-    raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
-    if (remembers_) {
-      const Vector fall_K = before_degC - degC_;
-      doubted_K_.head(n_) += fall_K.cast<float>();
-      kept_K_.head(n_) += (Vector::Constant(n_, fall_K[housing_.node]) - fall_K).cast<float>();
-    }
-    const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
-    if (heard_.acquired && guessed_ && left_K > least_gate_K) doubt(left_K);
-    return;
+/// Until the housing is known its readings count without limit.
+void CoreEstimator::meet_housing(float reading_degC, float above_model_K) {
+  const Vector before_degC = degC_;
+  if (!correct(sensor_sight(above_model_K), no_bound_K, 1)) return;
+  const int h = housing_.node;
+  const bool known = watch_.meet(uncertainty_.variance_K2(h) < squared(known_sigma_K), ambient_degC_);
+  // After a reset the winding does not follow the housing by itself.
+  raise_to(static_cast<float>(housing_of_degC(static_cast<double>(reading_degC))));
+  if (remembers_) {
+    const Vector fall_K = before_degC - degC_;
+    doubted_K_.head(n_) += fall_K.cast<float>();
+    kept_K_.head(n_) += (Vector::Constant(n_, fall_K[h]) - fall_K).cast<float>();
   }
-  const float sigma_K = std::sqrt(p_(sensor(), sensor()) + squared(late_shared_K_[sensor()] - late_K) + noise);
-  const float gate_K = gate_sigmas * sigma_K > least_gate_K ? gate_sigmas * sigma_K : least_gate_K;
-  // A sensor that moves with the load earns a new budget; one that stands still while the model moves is not believed.
-  const float expected_K = std::abs(heard_.model_moved_K);
-  const float moved_K = heard_.model_moved_K < 0.0f ? -heard_.reading_moved_K : heard_.reading_moved_K;
-  const bool tested = expected_K >= enough_movement_K;
-  const bool fallen = moved_K > off_share * expected_K && moved_K > expected_K + off_K;
-  if (tested && moved_K >= alive_share * expected_K && !fallen) {
-    heard_.pulled_K = 0.0f;
-    heard_.trusted_ambient_degC = ambient_degC_;
-    doubted_K_.setZero();
-  }
-  const bool stuck = tested && moved_K < stuck_share * expected_K && heard_.pulled_K > suspicious_pull_K;
+  const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
+  if (known && guessed_ && left_K > least_gate_K) doubt(left_K);
+}
+
+/// From then on only as far as its sensor is believed.
+void CoreEstimator::follow_housing(float above_model_K) {
+  Sight seen = sensor_sight(above_model_K);
   const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
-  const bool colder = innovation_K < -least_gate_K - kept_K && heard_.pulled_K >= most_pull_K;
-  if (!(innovation_K > -gate_K - kept_K) || (innovation_K < 0.0f && (stuck || colder))) {
-    disbelieve_housing();
-    return;
+  const auto verdict = watch_.judge(above_model_K, uncertainty_.sigma_K(seen), kept_K, ambient_degC_);
+  if (verdict.lives) doubted_K_.setZero();
+  if (verdict.believed) {
+    seen.above_K = verdict.counts_as_above_K;
+    correct(seen, verdict.most_down_K, HousingWatch::window_steps);
+  } else if (verdict.believed_till_now) {
+    give_back();
   }
-  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
-  const float left_K = most_pull_K - heard_.pulled_K;
-  // Hotter than believable counts for as much as is believable, and each further time for twice as much: a glitch of a
-  // second would raise the ambient for hours, and a housing that stays hot is followed within seconds.
-  const float believed_K = std::fmax(gate_K, heard_.hotter_K);
-  heard_.hotter_K = innovation_K > believed_K ? 2.0f * believed_K : 0.0f;
-  correct(seen, std::fmin(innovation_K, believed_K), noise, late_K, left_K > 0.0f ? left_K : 0.0f, window_steps);
 }
 
-/// From the first disbelief on the sensor is ignored, and what it had taken away is given back.
-void CoreEstimator::disbelieve_housing() {
-  if (!(flags_ & housing_contradicts)) {
-    settle(due_steps_);
-    due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
-    due_K_ = due_margin_K_ + Row::Constant(n_ + 5, heard_.pulled_K);
-    doubted_K_.setZero();
-    const float ambient_K = static_cast<float>(heard_.trusted_ambient_degC - ambient_degC_);
-    due_K_[ambient()] = ambient_K > 0.0f ? ambient_K : 0.0f;
-    due_steps_ = window_steps;
-    p_(housing_.node, housing_.node) += squared(unheard_sigma_K);
-    p_(ambient(), ambient()) += squared(unheard_sigma_K);
-  }
-  flags_ |= housing_contradicts;
+CoreEstimator::Sight CoreEstimator::sensor_sight(float above_model_K) const {
+  Sight seen{Row::Zero(uncertainty_.size()), above_model_K, squared(settings_.housing_noise_K),
+             static_cast<float>(uncertainty_.late_K())};
+  seen.of[sensor()] = 1.0f;
+  return seen;
 }
 
-/// How far a correction lowers the winding, K; negative if it raises all of them. What the housing falls the windings
-/// will, even those that it shares no error with.
-float CoreEstimator::down_by(const Row& gain, float innovation_K) const {
-  float down_K = -std::numeric_limits<float>::infinity();
-  for (int i = 0; i < n_; ++i) {
-    const float fall_K = -gain[i] * innovation_K;
-    if ((std::isfinite(max_degC_[i]) || i == housing_.node) && fall_K > down_K) down_K = fall_K;
-  }
-  return down_K;
-}
-
-/// Lets `steps` parts of the correction that is due flow into the state.
-void CoreEstimator::settle(int steps) {
-  if (due_steps_ <= 0 || steps <= 0) return;
-  const float part = static_cast<float>(steps) / static_cast<float>(due_steps_);
-  for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
-  ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
-  sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
-  last_sensor_degC_ += part * due_K_[sensor()];  // a correction is not a movement of the model
-  due_K_ *= 1.0f - part;
-  due_margin_K_ *= 1.0f - part;
-  due_steps_ -= steps;
-}
-
-/// Schmidt-Kalman correction in Joseph form by a reading that may be late_K too low for each sigma of the untold lag
-/// (an error that stays, and that no reading teaches: hearing it twice a second makes nothing surer), shortened so that
-/// it lowers no winding by more than most_down_K. It flows in over some steps: a jump of the estimate would be a jump
-/// of the allowance, which drops the robot.
-bool CoreEstimator::correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K,
-                            int over_steps) {
-  Row shared = Row::Zero(n_ + 5);
-  shared = p_.lazyProduct(seen);
-  float expected_K2 = seen.dot(shared) + variance_K2;
-  // A lag only makes a warming housing read colder: the hotter the reading, the less it is doubted for one. While the
-  // model cools a lag would make it read hotter, but so does a model that cools too fast, and that would be cold.
-  const bool raises = late_K != 0.0f && innovation_K > 0.0f;
-  const float doubt = !raises ? 1.0f : late_K < 0.0f ? 0.0f : 1.0f - innovation_K / least_gate_K;
-  const float lag_K = doubt > 0.0f ? doubt * (seen.dot(late_shared_K_) - late_K) : 0.0f;
-  shared += late_shared_K_ * lag_K;
-  expected_K2 += squared(lag_K);
-  if (!(expected_K2 > 0.0f) || !std::isfinite(innovation_K)) return false;
-  Row gain = shared / expected_K2;
-  gain.tail(3).setZero();  // a housing reading does not teach parameters
-  if (ambient_known_ || (!heard_.acquired && innovation_K < 0.0f))
-    gain[ambient()] = 0.0f;  // the first reading did that
-  const float down_K = down_by(gain, innovation_K);
-  if (down_K > most_down_K) gain *= most_down_K / down_K;
-  if (std::isfinite(most_down_K)) {
-    const float pulled_K = heard_.pulled_K + down_by(gain, innovation_K);  // net: noise up and down cancels
-    heard_.pulled_K = pulled_K > 0.0f ? pulled_K : 0.0f;
-  }
-  // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
-  // less heat. So a winding falls no further than it would follow.
-  if (seen[sensor()] != 0.0f && innovation_K < 0.0f) {
-    for (int i = 0; i < n_; ++i) gain[i] = std::fmin(gain[i], most_follow * std::fmax(gain[housing_.node], 0.0f));
-  }
-
+/// What a sensor had taken away that is no longer believed.
+void CoreEstimator::give_back() {
   settle(due_steps_);
-  due_margin_K_ = margins_K();
-  const Covariance keep = Covariance::Identity(n_ + 5, n_ + 5) - gain.lazyProduct(seen.transpose());
-  const Covariance half = keep.lazyProduct(p_);
-  p_ = half.lazyProduct(keep.transpose());
-  p_ += (gain * variance_K2).lazyProduct(gain.transpose());
-  // Raised, a state is no colder than it was: what a lag may hide grows only when a reading lowers.
-  if (!raises) late_shared_K_ = (keep.lazyProduct(late_shared_K_) + gain * late_K).eval();
-  p_ = ((p_ + p_.transpose()) * 0.5f).eval();
-  due_K_ = gain * innovation_K;
-  due_margin_K_ -= margins_K();
-  due_steps_ = over_steps;
-  if (over_steps == 1) settle(1);
-  return true;
+  due_margin_K_ = doubted_K_.cwiseMax(0.0f);  // until it has flowed in
+  due_K_ = due_margin_K_ + Row::Constant(uncertainty_.size(), watch_.pulled_K());
+  doubted_K_.setZero();
+  due_K_[ambient()] = std::fmax(static_cast<float>(watch_.trusted_ambient_degC() - ambient_degC_), 0.0f);
+  due_steps_ = HousingWatch::window_steps;
+  uncertainty_.lose_surroundings();
 }
 
-/// k sigma of each node.
-CoreEstimator::Row CoreEstimator::margins_K() const {
-  Row margins = Row::Zero(n_ + 5);
-  for (int i = 0; i < n_; ++i) margins[i] = settings_.margin_sigmas * std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
-  return margins;
-}
+// ---- the winding's resistance --------------------------------------------------------------------------------------
 
 void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at_25_degC,
                                         float copper_coefficient_per_K) {
@@ -453,41 +241,100 @@ void CoreEstimator::observe_winding_ohm(float ohm, float sigma_ohm, float ohm_at
 /// A mean winding temperature seen with a known error; false if it cannot be or is colder than four sigmas.
 bool CoreEstimator::hear_winding(float seen_degC, float sigma_K) {
   if (!plausible(static_cast<double>(seen_degC)) || !(sigma_K > 0.0f)) return false;
-  int windings = 0;
+  Sight seen{Row::Zero(uncertainty_.size()), seen_degC - static_cast<float>(mean_winding_degC()), squared(sigma_K),
+             0.0f};
+  for (int i = 0; i < n_; ++i) seen.of[i] = has_limit(i) ? 1.0f / static_cast<float>(limited_nodes_) : 0.0f;
+  const float gate_K = gate_sigmas * uncertainty_.sigma_K(seen);
+  if (!(seen.above_K > -gate_K)) return false;
+  seen.above_K = std::fmin(seen.above_K, gate_K);  // hotter than believable still counts, but one reading is only one
+  return correct(seen, no_bound_K, 1);
+}
+
+/// Of the nodes that have a limit; NaN, which nobody believes, if none has.
+double CoreEstimator::mean_winding_degC() const {
   double sum_degC = 0.0;
   for (int i = 0; i < n_; ++i) {
-    if (!std::isfinite(max_degC_[i])) continue;
-    ++windings;
-    sum_degC += degC_[i];
+    if (has_limit(i)) sum_degC += degC_[i];
   }
-  if (windings == 0) return false;
-  Row seen = Row::Zero(n_ + 5);
-  for (int i = 0; i < n_; ++i) seen[i] = std::isfinite(max_degC_[i]) ? 1.0f / static_cast<float>(windings) : 0.0f;
-  const float gate_K =
-      gate_sigmas * std::sqrt(seen.dot(p_.lazyProduct(seen)) + squared(seen.dot(late_shared_K_)) + squared(sigma_K));
-  const float innovation_K = seen_degC - static_cast<float>(sum_degC / windings);
-  if (!(innovation_K > -gate_K)) return false;
-  // Hotter than believable still counts, but one reading is only one.
-  return correct(seen, innovation_K < gate_K ? innovation_K : gate_K, squared(sigma_K), 0.0f,
-                 std::numeric_limits<float>::infinity(), 1);
+  return limited_nodes_ > 0 ? sum_degC / limited_nodes_ : std::numeric_limits<double>::quiet_NaN();
+}
+
+// ---- corrections ---------------------------------------------------------------------------------------------------
+
+/// Lets what is seen correct the states, by no more than lowers a winding by most_down_K. It flows in over some steps:
+/// a jump of the estimate would be a jump of the allowance, which drops the robot.
+bool CoreEstimator::correct(const Sight& seen, float most_down_K, int over_steps) {
+  Row gain;
+  if (!uncertainty_.gain(seen, gain)) return false;
+  if (ambient_known_ || (!watch_.housing_known() && seen.above_K < 0.0f))
+    gain[ambient()] = 0.0f;  // measured, or lowered by believe_ambient_below already
+  const float down_K = down_by(gain, seen.above_K);
+  if (down_K > most_down_K) gain *= most_down_K / down_K;
+  if (most_down_K < no_bound_K) watch_.note_pull(down_by(gain, seen.above_K));
+  // A housing that is colder than thought may be cooled better; to the filter it also looks like a winding that gets
+  // less heat. So a winding falls no further than it would follow.
+  if (seen.of[sensor()] != 0.0f && seen.above_K < 0.0f) {
+    for (int i = 0; i < n_; ++i) gain[i] = std::fmin(gain[i], most_follow * std::fmax(gain[housing_.node], 0.0f));
+  }
+
+  settle(due_steps_);
+  due_margin_K_ = margins_K();
+  uncertainty_.follow(seen, gain);
+  due_K_ = gain * seen.above_K;
+  due_margin_K_ -= margins_K();
+  due_steps_ = over_steps;
+  if (over_steps == 1) settle(1);
+  return true;
+}
+
+/// How far a correction lowers the winding, K; negative if it raises all of them. What the housing falls the windings
+/// will, even those that it shares no error with.
+float CoreEstimator::down_by(const Row& gain, float above_K) const {
+  float down_K = -std::numeric_limits<float>::infinity();
+  for (int i = 0; i < n_; ++i) {
+    const float fall_K = -gain[i] * above_K;
+    if ((has_limit(i) || i == housing_.node) && fall_K > down_K) down_K = fall_K;
+  }
+  return down_K;
+}
+
+/// k sigma of each node.
+CoreEstimator::Row CoreEstimator::margins_K() const {
+  Row margins = Row::Zero(uncertainty_.size());
+  for (int i = 0; i < n_; ++i) margins[i] = settings_.margin_sigmas * uncertainty_.sigma_K(i);
+  return margins;
+}
+
+/// Lets `steps` parts of the correction that is due flow into the state.
+void CoreEstimator::settle(int steps) {
+  if (due_steps_ <= 0 || steps <= 0) return;
+  const float part = static_cast<float>(steps) / static_cast<float>(due_steps_);
+  for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
+  ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
+  sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
+  watch_.model_corrected(part * due_K_[sensor()]);
+  due_K_ *= 1.0f - part;
+  due_margin_K_ *= 1.0f - part;
+  due_steps_ -= steps;
 }
 
 void CoreEstimator::raise_to(float winding_degC) {
   if (!plausible(static_cast<double>(winding_degC))) return;
   for (int i = 0; i < n_; ++i) {
-    if (std::isfinite(max_degC_[i]) && !(degC_[i] >= static_cast<double>(winding_degC)))
-      degC_[i] = static_cast<double>(winding_degC);
+    if (has_limit(i) && !(degC_[i] >= static_cast<double>(winding_degC))) degC_[i] = static_cast<double>(winding_degC);
   }
   publish();
 }
+
+// ---- resets --------------------------------------------------------------------------------------------------------
 
 HeatMemory CoreEstimator::save() const {
   HeatMemory memory{n_,
                     {},
                     {},
                     static_cast<float>(ambient_degC_),
-                    flags_ & housing_contradicts ? 1u : 0u,
-                    late_K_ > 0.0 ? static_cast<float>(late_K_) : 0.0f};
+                    watch_.contradicts() ? 1u : 0u,
+                    std::fmax(static_cast<float>(uncertainty_.late_K()), 0.0f)};
   for (int i = 0; i < n_; ++i) {
     // What is due now is so later, and what is doubted not proven.
     memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
@@ -501,82 +348,79 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   const double believed = static_cast<double>(settings_.ambient_degC);
   const double saved_ambient = static_cast<double>(memory.ambient_degC);
   ambient_degC_ = plausible(saved_ambient) && saved_ambient > believed ? saved_ambient : believed;
-  const double hottest = hottest_limit_degC();
+  const double hottest = lowest_limit_degC();
   Vector rise(n_);
   float sigma_K[max_nodes];
   for (int i = 0; i < n_; ++i) {
     const double saved = static_cast<double>(memory.degC[i]);
-    const double limit = std::isfinite(max_degC_[i]) ? static_cast<double>(max_degC_[i]) : hottest;
+    const double limit = has_limit(i) ? static_cast<double>(max_degC_[i]) : hottest;
     rise[i] = (plausible(saved) ? saved : limit) - ambient_degC_;
     if (!(rise[i] > 0.0)) rise[i] = 0.0;
     sigma_K[i] = memory.sigma_K[i] >= 0.0f ? std::fmin(memory.sigma_K[i], most_sigma_K) : start_sigma_K;
   }
   if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
   degC_ = rise.array() + ambient_degC_;
-  double sum_degC = 0.0;
-  int windings = 0;
-  for (int i = 0; i < n_; ++i) {
-    if (!std::isfinite(max_degC_[i])) continue;
-    sum_degC += degC_[i];
-    ++windings;
-  }
   bool soaked = true;
   for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
   begin_anew(sigma_K);
   remembers_ = memory.degC[housing_.node] > settings_.ambient_degC;  // or it was no warmer than its surroundings
-  if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K) late_K_ = static_cast<double>(memory.late_K);
-  if (soaked) soak();
-  if (windings > 0) raise_to(static_cast<float>(sum_degC / windings));
+  if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K)
+    uncertainty_.set_late_K(static_cast<double>(memory.late_K));
+  if (soaked) uncertainty_.soak();
+  raise_to(static_cast<float>(mean_winding_degC()));
   for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
     const double saved = static_cast<double>(memory.degC[i]);
     if (plausible(saved)) doubted_K_[i] = static_cast<float>(std::fmin(saved - degC_[i], 0.0));
     if (remembers_) kept_K_[i] = static_cast<float>(degC_[i] - degC_[housing_.node]);
   }
-  if (memory.disbelieved != 0) {  // or a reset would have it believed without limit, as a first reading is
-    flags_ |= housing_contradicts;
+  if (memory.disbelieved != 0) {
+    watch_.disbelieve();
     know_housing(sigma_K[housing_.node]);
   }
   publish();
 }
 
+/// The sensor is as warm as what it sits on, and nothing is due.
+void CoreEstimator::settle_sensor() {
+  sensor_degC_ = sensed_degC(degC_[housing_.node]);
+  watch_.model_jumped(static_cast<float>(sensor_degC_));
+  due_K_.setZero(uncertainty_.size());
+  due_margin_K_.setZero(uncertainty_.size());
+  due_steps_ = 0;
+}
+
 /// As well as if its sensor had been heard for long.
 void CoreEstimator::know_housing(float sigma_K) {
-  const int h = housing_.node;
-  heard_.acquired = true;
-  heard_.trusted_ambient_degC = ambient_degC_;
-  p_(h, h) = p_(h, sensor()) = p_(sensor(), h) = p_(sensor(), sensor()) = squared(sigma_K);
+  watch_.know_housing(ambient_degC_);
+  uncertainty_.know_housing(sigma_K);
 }
 
 void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
   const HeatMemory memory = save();
   const HousingSensor<double> described = housing_;
-  const SensorRecord record = heard_;
+  const HousingWatch record = watch_;
   const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
   const double sensed = sensor_degC_ + std::fmax(static_cast<double>(due_K_[sensor()]), 0.0);
-  const std::uint32_t missing = flags_ & housing_missing;
   new (this) CoreEstimator(set, settings);  // in place: too large for the stack
   restore(memory, 0.0);
-  const bool same_sensor = memory.node_count == n_ && described.node == housing_.node &&
-                           described.lag_s == housing_.lag_s && described.offset_K == housing_.offset_K &&
-                           described.gain_error == housing_.gain_error;
-  if (!same_sensor) return;
-  heard_ = record;
-  flags_ |= missing;
-  if (record.acquired && memory.disbelieved == 0) {
+  if (memory.node_count != n_ || !(described == housing_)) return;  // another sensor
+  watch_ = record;
+  watch_.drop_window();
+  if (watch_.housing_known() && !watch_.contradicts()) {
     const int h = housing_.node;
     degC_[h] = static_cast<double>(memory.degC[h] - doubted_K);  // not raised: what the sensor said of it stays said
     doubted_K_[h] = doubted_K;
     sensor_degC_ = sensed;
-    last_sensor_degC_ = static_cast<float>(sensed);
     good_degC_ = degC_;
     know_housing(memory.sigma_K[h]);
     believe_ambient_below(static_cast<double>(memory.ambient_degC));  // it would show at once if that is too cold
   }
+  watch_.model_jumped(static_cast<float>(sensor_degC_));
   publish();
 }
 
 void CoreEstimator::start_hot() {
-  const double hot = hottest_limit_degC() - static_cast<double>(unknown_below_K);
+  const double hot = lowest_limit_degC() - static_cast<double>(unknown_below_K);
   ambient_degC_ = static_cast<double>(settings_.ambient_degC);
   degC_ = Vector::Constant(n_, hot > ambient_degC_ ? hot : ambient_degC_);
   float sigma_K[max_nodes];
@@ -587,7 +431,7 @@ void CoreEstimator::start_hot() {
 }
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
-double CoreEstimator::hottest_limit_degC() const {
+double CoreEstimator::lowest_limit_degC() const {
   float lowest = 155.0f;
   for (int i = 0; i < n_; ++i) {
     if (max_degC_[i] < lowest) lowest = max_degC_[i];
@@ -595,48 +439,33 @@ double CoreEstimator::hottest_limit_degC() const {
   return static_cast<double>(lowest);
 }
 
-/// Nothing but temperatures and their sigmas has survived. What the windings were off by is taken for an error of how
-/// fast they warm (the worst case: the next burst adds to it), and for one that the housing does not show.
+/// Nothing but temperatures and their sigmas has survived.
 void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
-  sensor_degC_ = sensed_degC(degC_[housing_.node]);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);
   good_degC_ = degC_;
   good_ambient_degC_ = ambient_degC_;
-  heard_ = {};
+  watch_ = {};
+  settle_sensor();
   resumed_ = true;
-  flags_ &= ~static_cast<std::uint32_t>(housing_contradicts);
   remembers_ = guessed_ = false;
-  due_steps_ = 0;
-  due_K_ = due_margin_K_ = doubted_K_ = kept_K_ = Row::Zero(n_ + 5);
-  late_K_ = static_cast<double>(most_sigma_K);  // of a sensor of which nothing is known
-  widen_all();
-  const int power = n_ + 2, inner = n_ + 3;
-  for (int i = 0; i < n_; ++i) {
-    if (i == housing_.node) continue;
-    for (int j = 0; j < n_; ++j) {
-      if (j != housing_.node) p_(i, j) = sigma_K[i] * sigma_K[j];
-    }
-    p_(i, power) = p_(power, i) = sigma_K[i] * settings_.trust.power;
-    p_(i, inner) = p_(inner, i) = settings_.trust.correlation * sigma_K[i] * settings_.trust.inner_resistance;
-  }
-  p_(sensor(), sensor()) = p_(housing_.node, housing_.node);  // the sensor is as warm as what it sits on
-  p_(sensor(), housing_.node) = p_(housing_.node, sensor()) = p_(housing_.node, housing_.node);
+  doubted_K_.setZero(uncertainty_.size());
+  kept_K_.setZero(uncertainty_.size());
+  uncertainty_.begin_anew(sigma_K);
   publish();
 }
+
+// ---- state ---------------------------------------------------------------------------------------------------------
 
 /// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What
 /// has a limit and was not too cold may have been as hot as it seemed: it is at its limit at least.
 void CoreEstimator::guard_state() {
-  bool good = plausible(ambient_degC_) && plausible(sensor_degC_) && std::abs(late_K_) < hottest_possible_degC;
+  bool good =
+      plausible(ambient_degC_) && plausible(sensor_degC_) && std::abs(uncertainty_.late_K()) < hottest_possible_degC;
   for (int i = 0; i < n_; ++i) good = good && plausible(degC_[i]);
-  bool sure = true;
-  for (int i = 0; i < n_ + 5; ++i)
-    sure = sure && p_(i, i) >= 0.0f && p_(i, i) < 1e6f && std::abs(late_shared_K_[i]) < 1e3f;
-  for (int i = 0; i < n_ + 5; ++i) {
+  for (int i = 0; i < uncertainty_.size(); ++i) {
     if (!(std::abs(doubted_K_[i]) < 1e3f)) doubted_K_[i] = most_sigma_K;
     if (!(std::abs(kept_K_[i]) < 1e3f)) kept_K_[i] = 0.0f;
   }
-  if (!sure) widen_all();
+  if (!uncertainty_.sound()) uncertainty_.widen_all();
   if (good) {
     good_degC_ = degC_;
     good_ambient_degC_ = ambient_degC_;
@@ -646,15 +475,12 @@ void CoreEstimator::guard_state() {
   for (int i = 0; i < n_; ++i) {
     const double last = plausible(good_degC_[i]) ? good_degC_[i] : hottest_possible_degC - 100.0;
     const double limit = static_cast<double>(max_degC_[i]), hotter = last + static_cast<double>(restored_hotter_K);
-    degC_[i] = !(degC_[i] <= coldest_degC) && std::isfinite(limit) && limit > hotter ? limit : hotter;
+    degC_[i] = !(degC_[i] <= coldest_degC) && has_limit(i) && limit > hotter ? limit : hotter;
   }
   ambient_degC_ = plausible(good_ambient_degC_) ? good_ambient_degC_ : static_cast<double>(settings_.ambient_degC);
-  sensor_degC_ = sensed_degC(degC_[housing_.node]);
-  last_sensor_degC_ = static_cast<float>(sensor_degC_);
-  heard_.model_moved_K = 0.0f;
-  late_K_ = 0.0;
-  due_steps_ = 0;
-  due_K_ = due_margin_K_ = Row::Zero(n_ + 5);
+  settle_sensor();
+  watch_.forget_movement();
+  uncertainty_.set_late_K(0.0);
   good_degC_ = degC_;
 }
 
@@ -662,7 +488,7 @@ void CoreEstimator::publish() {
   estimate_.node_count = n_;
   for (int i = 0; i < n_; ++i) {
     estimate_.degC[i] = degC_[i];
-    estimate_.sigma_K[i] = std::sqrt(p_(i, i) + squared(late_shared_K_[i]));
+    estimate_.sigma_K[i] = uncertainty_.sigma_K(i);
     estimate_.margin_degC[i] = flags_ & state_restored
                                    ? std::numeric_limits<float>::infinity()
                                    : static_cast<float>(degC_[i]) + settings_.margin_sigmas * estimate_.sigma_K[i] +
@@ -672,6 +498,8 @@ void CoreEstimator::publish() {
   estimate_.housing_degC = degC_[housing_.node];
   estimate_.ambient_degC = ambient_degC_;
   estimate_.flags = flags_;
+  if (watch_.missing()) estimate_.flags |= housing_missing;
+  if (watch_.contradicts()) estimate_.flags |= housing_contradicts;
 }
 
 }  // namespace thermal

@@ -4,39 +4,18 @@
 //   in    the means of one 10 ms step (currents squared, speeds, power), the housing sensor, which may be missing
 //   out   every node's temperature, its standard deviation, and what went wrong
 //
-// State in double at 100 Hz: float at the PWM rate loses small increments and reads up to 55 K too cold. The covariance
-// is float: it is a margin, not a memory. A Schmidt-Kalman filter: errors of the sheet (power, R1, R2) and a lag of the
-// housing sensor that nobody told make sigma grow with load, are never "learned" from the housing; the ambient is a
+// State in double at 100 Hz: float at the PWM rate loses small increments and reads up to 55 K too cold. A HeatNetwork
+// says how temperatures move, Uncertainty how sure that is, HousingWatch whether the housing sensor is to be believed.
+// Here they meet: what is seen corrects the state, and what is doubted after a reset stays a margin. The ambient is a
 // slow state, since most boards cannot measure it. Everything fails towards hot. Knows neither clock nor sensor. No
 // heap; every call costs the same but for lost time. Not for an ISR.
 #pragma once
 
+#include "thermal/housing_watch.hpp"
 #include "thermal/network.hpp"
+#include "thermal/uncertainty.hpp"
 
 namespace thermal {
-
-inline constexpr double estimator_dt_s = 0.01;
-
-/// A measured value that may be missing; `valid` false: open, short, stale. Then the value means nothing.
-struct Reading {
-  float value;
-  bool valid;
-};
-
-/// Relative standard deviations of what the heat set claims.
-struct Trust {
-  float power;             // heat per A^2 against heat capacity of a winding: what a burst depends on
-  float inner_resistance;  // links between nodes (R1): what a steady winding depends on
-  float cooling;           // links to the world (R2)
-  /// Of the errors of capacity and inner resistance, -1..1. Their product is known best: too much of one goes with too
-  /// little of the other. A load that lasts as long as a winding takes to warm is then more uncertain than if the two
-  /// erred independently, and what it cools by afterwards less.
-  float correlation = -0.5f;
-};
-/// Catalogue values are good to 10..30 %. Identified: typical standard errors of a fit with core readings.
-inline constexpr Trust sheet_trust{0.20f, 0.20f, 0.20f};
-inline constexpr Trust identified_trust{0.02f, 0.04f, 0.05f};
-inline constexpr Trust exact_trust{0.0f, 0.0f, 0.0f};
 
 struct EstimatorSettings {
   Trust trust = sheet_trust;
@@ -128,81 +107,68 @@ class CoreEstimator {
   const HeatInput<>& input() const { return input_; }
 
  private:
-  static constexpr int max_states = max_nodes + 5;
-  using Covariance = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, max_states, max_states>;
-  using Row = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_states, 1>;
+  using Row = Uncertainty::Row;
+  using Sight = Uncertainty::Sight;
 
-  void widen_all();
-  void soak();
-  double hottest_limit_degC() const;
-  void begin_anew(const float (&sigma_K)[max_nodes]);
   bool take_input(const HeatInput<>& input);
   void step();
-  void propagate_covariance(const HeatNetwork<double>::Rates& rates);
-  void hear_housing(Reading housing);
-  void correct_by_housing(float reading_degC, float innovation_K, bool first);
-  void meet_sensor(float reading_degC);
-  void doubt(float left_K);
-  void believe_ambient_below(double housing_degC);
-  void know_housing(float sigma_K);
+  void step_uncertainty();
+
   double sensed_degC(double housing_degC) const;
   double housing_of_degC(double sensed_degC) const;
-  void disbelieve_housing();
-  Row margins_K() const;
+  void hear_housing(Reading housing);
+  void believe_ambient_below(double housing_degC);
+  void meet_sensor(float reading_degC);
+  void meet_housing(float reading_degC, float above_model_K);
+  void follow_housing(float above_model_K);
+  Sight sensor_sight(float above_model_K) const;
+  void doubt(float left_K);
+  void give_back();
   bool hear_winding(float seen_degC, float sigma_K);
-  bool correct(const Row& seen, float innovation_K, float variance_K2, float late_K, float most_down_K, int over_steps);
+  double mean_winding_degC() const;
+
+  bool correct(const Sight& seen, float most_down_K, int over_steps);
+  float down_by(const Row& gain, float above_K) const;
+  Row margins_K() const;
   void settle(int steps);
-  float down_by(const Row& gain, float innovation_K) const;
+
+  void begin_anew(const float (&sigma_K)[max_nodes]);
+  void settle_sensor();
+  void know_housing(float sigma_K);
+  double lowest_limit_degC() const;
+
   void guard_state();
   void publish();
   float due_above_K(int node) const { return due_margin_K_[node] > 0.0f ? due_margin_K_[node] : 0.0f; }
   float doubt_above_K(int node) const { return doubted_K_[node] > 0.0f ? doubted_K_[node] : 0.0f; }
 
-  // Indices behind the nodes: ambient, sensor, errors of power, inner links, outer links.
-  int ambient() const { return n_; }
-  int sensor() const { return n_ + 1; }
+  bool has_limit(int node) const { return std::isfinite(max_degC_[node]); }
+  int ambient() const { return uncertainty_.ambient(); }
+  int sensor() const { return uncertainty_.sensor(); }
 
   HeatNetwork<double> network_;
   Transition<double> transition_;
   EstimatorSettings settings_;
   HousingSensor<double> housing_;
-  int n_;
+  int n_, limited_nodes_ = 0;  // nodes; those of them that have a limit: windings, mostly
   float max_degC_[max_nodes];
 
+  Uncertainty uncertainty_;
   Vector degC_, good_degC_;
-  double ambient_degC_, good_ambient_degC_, sensor_degC_;
-  Covariance p_;
-  // The lag that nobody told: one more error that is never learned. What it shares with the states is kept apart from
-  // p_: sigma^2 is p_(i, i) + late_shared_K_[i]^2.
-  Row late_shared_K_;       // how much colder the states were made, per sigma of it
-  double late_K_ = 0.0;     // how much less a sensor reads that lags by one sigma more
-  double late_take_ = 1.0;  // share of its way that such a sensor goes in a step
-  Row due_K_;               // what the last correction has yet to add, in due_steps_ steps,
-  Row due_margin_K_;        // and what it has yet to take from the margins: surer at once, they would be colder at once
-  int due_steps_ = 0;
+  double ambient_degC_, good_ambient_degC_, sensor_degC_;  // the latter: what it reads, lag and all
+  bool ambient_known_ = false;                             // measured
   HeatInput<> input_;
+  Row due_K_;         // what the last correction has yet to add, in due_steps_ steps,
+  Row due_margin_K_;  // and what it has yet to take from the margins: surer at once, they would be colder at once
+  int due_steps_ = 0;
+
+  HousingWatch watch_;
+  bool resumed_ = false;  // after a reset: the sensor may lag behind what was remembered
   // How much hotter the states would be had the first readings after a reset not lowered what was remembered. Counts as
   // margin until the sensor proves that it lives: it may have come off, or sit on another motor.
   Row doubted_K_;
-  Row kept_K_;  // how much hotter the nodes are than a housing that was off for long; no sensor has to show
+  Row kept_K_;  // how much hotter they are than those of a motor that cooled meanwhile; a sensor need not show that
   bool remembers_ = false, guessed_ = false;  // since the reset: a warm motor; nothing
-
-  double reading_sum_ = 0.0, sensor_sum_ = 0.0;  // of readings in this window
-  int window_ = 0;                               // steps of them
-  bool ambient_known_ = false;
-  bool resumed_ = false;  // after a reset: the sensor may lag behind what was remembered
-  float last_sensor_degC_ = 0.0f;
-  /// The housing sensor's record: of the sensor, whatever the model is.
-  struct SensorRecord {
-    int silent = 0, unheard = 0;  // steps without a reading, since a window was last full
-    bool acquired = false, read = false;
-    int met = 0;                        // readings that were believed without limit
-    double trusted_ambient_degC = 0.0;  // when the sensor last proved that it lives
-    float pulled_K = 0.0f;              // how far it has pulled the winding down lately
-    float hotter_K = 0.0f;              // what the next reading that is too hot counts for
-    float model_moved_K = 0.0f;         // how far the model says the housing moved in about two minutes,
-    float reading_slow_degC = 0.0f, reading_moved_K = 0.0f;  // and how far the reading did
-  } heard_;
 
   std::uint32_t flags_ = 0;
   Estimate estimate_{};

@@ -93,9 +93,8 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
   // What heats without |i|^2 goes on as in the last step; what follows |i|^2 is taken out and counted per A^2.
   HeatInput<> rest = core.input(), unit{};
   for (int k = 0; k < 3; ++k) {
-    const auto phase = static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k);
-    rest[phase] = 0.0;
-    unit[phase] = static_cast<double>(shares.k[k]);
+    rest[phase_drive(k)] = 0.0;
+    unit[phase_drive(k)] = static_cast<double>(shares.k[k]);
   }
   rest[Drive::current_A2] = rest[Drive::current2_speed2] = 0.0;
   unit[Drive::current_A2] = 1.0;
@@ -113,7 +112,7 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
 Allowance Governor::tick(const CoreEstimator& core) {
   const Estimate& now = core.estimate();
   const PhaseShares shares = phase_shares(core.input());
-  Allowance best{settings_.max_A, settings_.max_A, wire::Limit::hardware, -1};
+  Allowance allowance{settings_.max_A, wire::Limit::hardware};
   float allowed_A = settings_.max_A, ceiling_A = settings_.max_A;
   for (int i = 0; i < now.node_count; ++i) {
     const float core_degC = now.margin_degC[i];
@@ -122,16 +121,14 @@ Allowance Governor::tick(const CoreEstimator& core) {
     const float node_A = allowed_current_A(core_degC, budget, settings_);
     if (!(node_A >= allowed_A)) {
       allowed_A = node_A;
-      best.node = static_cast<std::int8_t>(i);
-      best.holding_A = holding_A(budget, settings_);
-      best.limit = core_degC < 1e30f ? wire::Limit::core_hot : wire::Limit::blind;
+      allowance.limit = core_degC < 1e30f ? wire::Limit::core_hot : wire::Limit::blind;
     }
     ceiling_A = smallest(ceiling_current_A(core_degC, budget, settings_), ceiling_A);
   }
   last_A_ = sloped_allowance_A(last_A_, allowed_A, ceiling_A, static_cast<float>(estimator_dt_s), settings_);
-  best.current_A = last_A_;
-  if (best.limit == wire::Limit::hardware && last_A_ < settings_.max_A) best.limit = wire::Limit::core_hot;
-  return best;
+  allowance.current_A = last_A_;
+  if (allowance.limit == wire::Limit::hardware && last_A_ < settings_.max_A) allowance.limit = wire::Limit::core_hot;
+  return allowance;
 }
 
 }  // namespace thermal

@@ -59,9 +59,7 @@ PhaseShares phase_shares(const HeatInput<>& input);
 
 struct Allowance {
   float current_A;    // largest |i| from now on
-  float holding_A;    // what it would settle on, for the node that limits
   wire::Limit limit;  // hardware, core_hot, or blind when the estimate is broken
-  std::int8_t node;   // that limits; -1: none
 };
 
 class Governor {

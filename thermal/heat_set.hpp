@@ -18,6 +18,8 @@ inline constexpr int max_nodes = 8;
 inline constexpr int max_links = 16;
 inline constexpr int max_sources = 16;
 
+inline constexpr double estimator_dt_s = 0.01;  // what CoreEstimator and all in it step by
+
 /// Temperatures that the network does not compute but is given; a link may end at one.
 enum class Boundary : std::uint8_t { ambient, coolant, frame, neighbour, count };
 inline constexpr int boundary_count = static_cast<int>(Boundary::count);
@@ -41,6 +43,8 @@ enum class Drive : std::uint8_t {
   count
 };
 constexpr bool is_current_square(Drive drive) { return drive >= Drive::phase_a_A2 && drive <= Drive::current_A2; }
+/// The square of the current in phase k, 0..2.
+constexpr Drive phase_drive(int k) { return static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k); }
 inline constexpr int drive_count = static_cast<int>(Drive::count);
 
 enum class LinkLaw : std::uint8_t {
@@ -100,6 +104,8 @@ struct HousingSensor {
   Scalar lag_s;
   Scalar offset_K;
   Scalar gain_error;
+
+  bool operator==(const HousingSensor&) const = default;
 };
 
 template <class Scalar>

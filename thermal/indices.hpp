@@ -26,7 +26,7 @@ inline double forced_cooling_index(const wire::Motor& m) {
 }
 
 /// Direct current through two terminals that heats like phase currents of this amplitude.
-inline double direct_A(double amplitude_A) { return std::sqrt(0.75) * amplitude_A; }
+inline double direct_A(double amplitude_A) { return wire::direct_per_amplitude * amplitude_A; }
 
 /// Amplitude that holds the winding at its limit for ever.
 inline double rated_current_A(const wire::Motor& m, double ambient_degC) {

@@ -15,7 +15,7 @@ HeatInput<> future_input(const CoreEstimator& core, float current_A, const Phase
   HeatInput<> input = core.input();
   const double i_A = static_cast<double>(current_A), i_A2 = i_A * i_A;
   for (int k = 0; k < 3; ++k) {
-    input[static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k)] = i_A2 * static_cast<double>(shares.k[k]);
+    input[phase_drive(k)] = i_A2 * static_cast<double>(shares.k[k]);
   }
   input[Drive::current_A2] = i_A2;
   input[Drive::current_A] = i_A;

@@ -49,8 +49,7 @@ constexpr HeatSet<double> three_phase_set(const wire::Motor& m) {
     set.nodes[k] = {m.C1_J_per_K / 3.0, static_cast<float>(m.winding_max_degC)};
     set.links[k] = motor_set::link(k, housing, 1.0 / (3.0 * m.R1_K_per_W));
     set.links[3 + k] = motor_set::link(k, (k + 1) % 3, m.phase_coupling_W_per_K);
-    const auto drive = static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k);
-    set.sources[k] = {static_cast<std::int8_t>(k), drive, m.phase_resistance_ohm, m.copper_coefficient_per_K};
+    set.sources[k] = {static_cast<std::int8_t>(k), phase_drive(k), m.phase_resistance_ohm, m.copper_coefficient_per_K};
     set.sources[3 + k] = {static_cast<std::int8_t>(k), Drive::power_W, 1.0 / 3.0, 0.0};
   }
   set.links[6] = motor_set::link(housing, boundary_end(Boundary::ambient), 1.0 / m.R2_K_per_W);
@@ -97,7 +96,7 @@ constexpr HeatSet<double> split_phases(const HeatSet<double>& lumped, double cou
     source.gain *= copper ? 2.0 / 3.0 : 1.0 / copies;
     for (int k = 0; k < copies; ++k) {
       source.node = copies == 3 ? static_cast<std::int8_t>(k) : moved(lumped.sources[i].node);
-      if (copper) source.drive = static_cast<Drive>(static_cast<int>(Drive::phase_a_A2) + k);
+      if (copper) source.drive = phase_drive(k);
       set.sources[set.source_count++] = source;
     }
   }

@@ -88,8 +88,6 @@ class HeatNetwork {
     }
   }
 
-  int size() const { return n_; }
-  const Matrix& rate_matrix_per_s() const { return a_; }
   const Scalar& capacity_J_per_K(int node) const { return capacity_J_per_K_[node]; }
 
   Transition<Scalar, N> transition(double dt_s) const {
@@ -135,10 +133,11 @@ class HeatNetwork {
     return s + a_.lazyProduct(degC);
   }
 
-  /// dT/dt told apart by where the heat comes from, K/s: what the covariance needs.
+  /// dT/dt told apart by where the heat comes from: what the covariance needs.
   struct Rates {
-    Vector sources, inner, outer;  // sources; links between nodes; links to boundaries (all curved laws count here)
-    Vector source_slope_per_s;     // d sources / dT
+    Vector sources_K_per_s;
+    Vector inner_K_per_s, outer_K_per_s;  // links between nodes; links to boundaries (all curved laws count here)
+    Vector source_slope_per_s;            // d sources / dT
   };
 
   template <class Data>
@@ -146,17 +145,17 @@ class HeatNetwork {
     Vector base = Vector::Zero(n_), slope = Vector::Zero(n_);
     gather(input, base, slope);
     Rates r;
-    r.outer = Vector::Zero(n_);
+    r.outer_K_per_s = Vector::Zero(n_);
     for (int i = 0; i < boundary_count_; ++i) {
       const BoundaryTerm& b = boundaries_[i];
       const Scalar given = b.per_s * input.boundary_degC[b.boundary];
       base[b.node] -= given;
-      r.outer[b.node] += given - b.per_s * degC[b.node];
+      r.outer_K_per_s[b.node] += given - b.per_s * degC[b.node];
     }
-    if (curved_count_ > 0) add_curved(degC, input, r.outer);
+    if (curved_count_ > 0) add_curved(degC, input, r.outer_K_per_s);
     r.source_slope_per_s = slope;
-    r.sources = base + slope.cwiseProduct(degC);
-    r.inner = rate_K_per_s(degC, input) - r.sources - r.outer;
+    r.sources_K_per_s = base + slope.cwiseProduct(degC);
+    r.inner_K_per_s = rate_K_per_s(degC, input) - r.sources_K_per_s - r.outer_K_per_s;
     return r;
   }
 

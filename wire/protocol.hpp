@@ -157,6 +157,9 @@ struct Answer {
   std::uint8_t axis = no_axis;
   std::uint16_t id = 0;
 };
+constexpr Answer refused(Status why, std::uint8_t axis = no_axis, std::uint16_t id = 0) {
+  return {static_cast<std::uint8_t>(why), axis, id};
+}
 
 /// Texts are padded with NUL and end with one.
 struct Hello {
@@ -203,10 +206,10 @@ struct AxisReport {
   std::uint8_t refused = 0;  // wire::Status of the setpoint in this exchange
   ControlMode control;       // what a setpoint means
   std::uint8_t zero[3]{};
-  float id_A, iq_A;          // measured
-  float speed_rad_per_s;     // mechanical
-  float rotor_rad;           // mechanical, [0, 2 pi]
-  float core_degC;           // estimated, of the hottest phase
+  float id_A, iq_A;       // measured
+  float speed_rad_per_s;  // mechanical
+  float rotor_rad;        // mechanical, [0, 2 pi]
+  float core_degC;        // estimated, of the hottest phase
   float core_sigma_K;
   float housing_degC;            // estimated
   float allowance_A;             // largest |i| that is allowed now

@@ -30,7 +30,7 @@ class Reply {
     count_ = static_cast<std::uint16_t>(count_ + bytes);
   }
   void refuse(wire::Status status, std::uint8_t axis = wire::no_axis, std::uint16_t id = 0) {
-    put(wire::Answer{static_cast<std::uint8_t>(status), axis, id});
+    put(wire::refused(status, axis, id));
   }
 
   const std::uint8_t* bytes() const { return bytes_; }
@@ -60,7 +60,6 @@ class Commands {
   wire::State state() const;
   Driver& driver() { return driver_; }
   ParameterStore& parameters() { return parameters_; }
-  const usb::Identity& identity() const { return identity_; }
 
  private:
   void hello(Reply& reply);

@@ -9,15 +9,14 @@ namespace firmware {
 /// A new host, or the same one after a bus reset: it waits for nothing that was asked before.
 void Link::restart() {
   reader_.restart();
-  held_ = held_count_ = sent_ = queued_ = 0;
+  held_.drop();
+  sent_ = queued_ = 0;
   if (errand_for_ == For::program) errand_for_ = For::nobody;
   if (parameters_free()) commands_.parameters().take_back();
 }
 
 void Link::take(const std::uint8_t* data, std::size_t bytes) {
-  held_ = 0;
-  held_count_ = std::min(bytes, sizeof held_packet_);
-  std::memcpy(held_packet_, data, held_count_);
+  held_.take(data, bytes);
   digest();
 }
 
@@ -38,8 +37,8 @@ std::size_t Link::give(std::uint8_t* out, std::size_t room) {
 
 /// What came and was not looked at yet, as long as answers have room.
 void Link::digest() {
-  while (held_ < held_count_ && has_room()) {
-    if (reader_.take(held_packet_[held_++])) obey(reader_.frame());
+  while (!held_.empty() && has_room()) {
+    if (reader_.take(held_.next())) obey(reader_.frame());
   }
 }
 
@@ -121,7 +120,7 @@ bool Link::parameters_free() const {
 
 wire::Answer Link::load() {
   const auto from = static_cast<wire::LoadFrom>(errand_payload_[0]);
-  if (from > wire::LoadFrom::defaults) return {static_cast<std::uint8_t>(wire::Status::out_of_range)};
+  if (from > wire::LoadFrom::defaults) return wire::refused(wire::Status::out_of_range);
   return commands_.parameters().load(from);
 }
 
@@ -130,8 +129,7 @@ void Link::look_ahead() {
   constexpr int steps_a_slice = 10;
   wire::Ask ask{};
   std::memcpy(&ask, errand_payload_, sizeof ask);
-  if (ask.axis >= axis_count)
-    return finish(wire::Answer{static_cast<std::uint8_t>(wire::Status::no_such_axis), ask.axis, 0});
+  if (ask.axis >= axis_count) return finish(wire::refused(wire::Status::no_such_axis, ask.axis));
   const thermal::CoreEstimator& core = commands_.driver().axis(ask.axis).core();
   if (!looking_ahead_) {
     constexpr float standing = 1.0f, turning = 0.5f;  // mean(i_k^2) / |i|^2
@@ -147,7 +145,7 @@ void Link::look_ahead() {
       pieces[i] = {segment.seconds, segment.current_A};
     }
     if (!profile_.begin(core, pieces, count, shares))
-      return finish(wire::Answer{static_cast<std::uint8_t>(wire::Status::out_of_range), ask.axis, 0});
+      return finish(wire::refused(wire::Status::out_of_range, ask.axis));
     looking_ahead_ = true;
     return;
   }

@@ -11,7 +11,7 @@
 #include <cstdint>
 
 #include "firmware/link/commands.hpp"
-#include "hal/usb_port.hpp"
+#include "firmware/link/held_packet.hpp"
 #include "thermal/look_ahead.hpp"
 #include "wire/framer.hpp"
 
@@ -25,7 +25,7 @@ class Link {
 
   // usb::Stream, USB context.
   void restart();
-  bool wants() const { return held_ == held_count_; }
+  bool wants() const { return held_.empty(); }
   void take(const std::uint8_t* data, std::size_t bytes);
   std::size_t give(std::uint8_t* out, std::size_t room);
 
@@ -58,11 +58,8 @@ class Link {
   std::uint32_t bad_frames() const { return reader_.bad(); }
 
  private:
-  enum class Errand : std::uint8_t {
-    none,
-    asked,
-    done
-  };  // USB context: none -> asked, done -> none; main: asked -> done
+  // USB context: none -> asked, done -> none; main context: asked -> done.
+  enum class Errand : std::uint8_t { none, asked, done };
 
   void digest();
   void obey(const wire::Frame& request);
@@ -86,8 +83,7 @@ class Link {
 
   Commands commands_;
   wire::FrameReader reader_;
-  std::uint8_t held_packet_[hal::usb_packet_bytes]{};
-  std::size_t held_ = 0, held_count_ = 0;  // bytes of it that were looked at, and all
+  HeldPacket held_;
   std::uint8_t queue_[2 * wire::max_encoded]{};
   std::size_t sent_ = 0, queued_ = 0;  // queue_[sent_, queued_) waits
   std::uint8_t telemetry_sequence_ = 0;

@@ -47,16 +47,14 @@ bool axis_number(const char* text, int& axis) {
 }  // namespace
 
 void TextPort::take(const std::uint8_t* data, std::size_t bytes) {
-  held_ = 0;
-  held_count_ = std::min(bytes, sizeof held_packet_);
-  std::memcpy(held_packet_, data, held_count_);
+  held_.take(data, bytes);
   digest();
 }
 
 /// What came and was not looked at yet, up to a line that takes time.
 void TextPort::digest() {
-  while (held_ < held_count_ && !waits_) {
-    const char c = static_cast<char>(held_packet_[held_++]);
+  while (!held_.empty() && !waits_) {
+    const char c = static_cast<char>(held_.next());
     if (c == '\r' || c == '\n') {
       line_[line_count_] = 0;
       if (too_long_)

@@ -17,10 +17,11 @@ class TextPort {
 
   // usb::Stream
   void restart() {
-    line_count_ = said_ = count_ = held_ = held_count_ = 0;
+    held_.drop();
+    line_count_ = said_ = count_ = 0;
     too_long_ = waits_ = false;
   }
-  bool wants() const { return count_ == 0 && held_ == held_count_; }  // the last answer has left
+  bool wants() const { return count_ == 0 && held_.empty(); }  // the last answer has left
   void take(const std::uint8_t* data, std::size_t bytes);
   std::size_t give(std::uint8_t* out, std::size_t room);
 
@@ -45,9 +46,8 @@ class TextPort {
   char line_[64]{};
   std::size_t line_count_ = 0;
   bool too_long_ = false;
-  std::uint8_t held_packet_[hal::usb_packet_bytes]{};
-  std::size_t held_ = 0, held_count_ = 0;  // bytes of it that were looked at, and all
-  bool waits_ = false;                     // for its errand
+  HeldPacket held_;
+  bool waits_ = false;  // for its errand
   char answer_[512]{};
   std::size_t said_ = 0, count_ = 0;
 };

@@ -11,24 +11,14 @@ constexpr std::uint8_t low(std::size_t x) { return static_cast<std::uint8_t>(x);
 constexpr std::uint8_t high(std::size_t x) { return static_cast<std::uint8_t>(x >> 8); }
 
 // 9.6.1. Class EFh/02h/01h: functions are told apart by interface association (IAD ECN).
-constexpr std::uint8_t device[] = {18,
-                                   1,
-                                   0x01,
-                                   0x02,
-                                   0xEF,
-                                   0x02,
-                                   0x01,  // USB 2.01: there is a BOS
-                                   low(hal::usb_packet_bytes),
-                                   low(wire::usb_vendor_id),
-                                   high(wire::usb_vendor_id),
-                                   low(wire::usb_product_id),
-                                   high(wire::usb_product_id),
-                                   0x00,
-                                   0x01,  // release of the device 1.00
-                                   text_manufacturer,
-                                   text_product,
-                                   text_serial,
-                                   1};
+// clang-format off
+constexpr std::uint8_t device[] = {
+    18, 1, 0x01, 0x02,  // USB 2.01: there is a BOS
+    0xEF, 0x02, 0x01, low(hal::usb_packet_bytes),
+    low(wire::usb_vendor_id), high(wire::usb_vendor_id), low(wire::usb_product_id), high(wire::usb_product_id),
+    0x00, 0x01,  // release of the device 1.00
+    text_manufacturer, text_product, text_serial, 1};
+// clang-format on
 static_assert(sizeof device == 18);
 
 constexpr std::size_t configuration_bytes = 9 + (9 + 7 + 7) + 8 + (9 + 5 + 5 + 4 + 5 + 7) + (9 + 7 + 7);
@@ -94,39 +84,15 @@ constexpr MsSet ms_set;
 static_assert(ms_set.at == MsSet::bytes && MsSet::bytes <= 0xFFFF);
 
 // USB 3.2 9.6.2 and 9.6.2.4 (platform capability); MS table 4.
-constexpr std::uint8_t bos[] = {5,
-                                15,
-                                33,
-                                0,
-                                1,  //
-                                28,
-                                16,
-                                5,
-                                0,  // {D8DD60DF-4589-4CC7-9CD2-659D9E648A9F}
-                                0xDF,
-                                0x60,
-                                0xDD,
-                                0xD8,
-                                0x89,
-                                0x45,
-                                0xC7,
-                                0x4C,
-                                0x9C,
-                                0xD2,
-                                0x65,
-                                0x9D,
-                                0x9E,
-                                0x64,
-                                0x8A,
-                                0x9F,  //
-                                windows_8_1[0],
-                                windows_8_1[1],
-                                windows_8_1[2],
-                                windows_8_1[3],  //
-                                low(MsSet::bytes),
-                                high(MsSet::bytes),
-                                ms_vendor_code,
-                                0};
+// clang-format off
+constexpr std::uint8_t bos[] = {
+    5, 15, 33, 0, 1,
+    28, 16, 5, 0,
+    0xDF, 0x60, 0xDD, 0xD8, 0x89, 0x45, 0xC7, 0x4C, 0x9C, 0xD2, 0x65, 0x9D, 0x9E, 0x64, 0x8A, 0x9F,
+    // above: {D8DD60DF-4589-4CC7-9CD2-659D9E648A9F}
+    windows_8_1[0], windows_8_1[1], windows_8_1[2], windows_8_1[3], low(MsSet::bytes), high(MsSet::bytes),
+    ms_vendor_code, 0};
+// clang-format on
 static_assert(sizeof bos == 33);
 
 template <std::size_t count>

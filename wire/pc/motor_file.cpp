@@ -27,7 +27,8 @@ struct Key {
   double otherwise;  // value of a key that may be missing
 };
 
-// Defaults: the copper coefficient of IEC 60228 copper at 25 degC; no phase coupling, which is the safe side.
+// Defaults: the copper coefficient of IEC 60028, which is of 20 degC: taken at 25 degC it makes a winding of 155 degC
+// heat by 0.7 % too much, to the safe side; no phase coupling, which is the safe side too.
 constexpr Key keys[] = {
     {"terminal_resistance_ohm", Need::must, Range::positive, 0},
     {"terminal_inductance_mH", Need::must, Range::positive, 0},
