@@ -66,6 +66,7 @@ void add_commands(CLI::App& app, Console& console) {
   add_motion(app, console);
   add_records(app, console);
   add_identify(app, console);
+  add_model(app, console);
 }
 
 int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {

@@ -33,9 +33,9 @@ std::vector<Piece> designed_course(double continuous_A, double minutes);
 /// A motor sheet (TOML) that says what the board believes: identify's gauge is then the board's resistance.
 std::string sheet_of(const Values& values, const std::string& name);
 
-/// Parameters that the model file of identify (--write-model) comes to on this board; empty if the model has something
-/// that they cannot express, and `why` says what.
-Values parameters_of_model(const std::string& path, std::string& why);
+/// Parameters that the model file of identify (--write-model) comes to on this board, of which `before` is known; empty
+/// if the model has something that they cannot express, and `why` says what.
+Values parameters_of_model(const std::string& path, const Values& before, std::string& why);
 
 /// What is offered to be written, and a sentence that says why not more.
 struct Offer {

@@ -68,11 +68,16 @@ Values values_of(Session& session, int axis) {
   return values;
 }
 
+struct Consent {
+  bool yes = false, save = false;
+};
+
 struct Arguments {
   std::string axis = "0", out = "out/identify";
   double minutes = 20, leads_ohm = 0.01;
   std::optional<double> ambient_degC;
-  bool turning = false, yes = false, save = false, force = false;
+  bool turning = false, force = false;
+  Consent consent;
 };
 
 constexpr double log_Hz = 20;
@@ -185,8 +190,8 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
   return driven;
 }
 
-bool agreed(Console& console, const Arguments& a) {
-  if (a.yes) return true;
+bool agreed(Console& console, const Consent& consent) {
+  if (consent.yes) return true;
   if (console.options.json || isatty(STDIN_FILENO) == 0) return false;
   fmt::print("Put these in force? [y/N] ");
   std::fflush(stdout);
@@ -195,6 +200,39 @@ bool agreed(Console& console, const Arguments& a) {
   std::cin.clear();  // Ctrl-C ended it, and the prompt may ask again
   stop_if_interrupted("Stopped; nothing was written.");
   return answer == "y" || answer == "yes";
+}
+
+struct Outcome {
+  std::string text;
+  Json json;
+};
+
+/// Shows what would change, and after a yes writes it.
+Outcome put_in_force(Console& console, int axis, const Values& before, const Values& found, const Consent& consent) {
+  Session& session = console.session();
+  std::string text;
+  Json changes = Json::object();
+  std::vector<Assignment> assignments;
+  for (const auto& [name, value] : found) {
+    const auto old = before.find(name);
+    if (old == before.end() || old->second == value) continue;
+    const Target target = session.parameters().named(fmt::format("axis{}.{}", axis, name)).front();
+    assignments.push_back({target, value});
+    text += fmt::format("  {:<32} {:>11} -> {}\n", full_name(target), shown(old->second), shown(value));
+    changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
+  }
+  for (const Assignment& assignment : assignments) check(assignment, "identify found ");
+  if (!console.options.json) fmt::print("{}", text);
+  const bool written = !assignments.empty() && agreed(console, consent);
+  if (written) {
+    session.set(assignments);
+    if (consent.save) session.save();
+  }
+  const char* said = written && consent.save ? "In force and saved.\n"
+                     : written               ? "In force until the next reset; 'hotcore save' keeps it.\n"
+                     : assignments.empty()   ? "Nothing to write: the board has these values already.\n"
+                                             : "Nothing was written; --yes writes without asking.\n";
+  return {said, {{"changes", changes}, {"written", written}, {"saved", written && consent.save}}};
 }
 
 void identify(Console& console, const Arguments& a) {
@@ -228,48 +266,58 @@ void identify(Console& console, const Arguments& a) {
   if (!answer.is_object()) refuse_data(json + ": identify left no answer there; run it on the log by hand.");
   const std::string sentence = answer.value("sentence", std::string());
   const Offer offered = offer(answer, model, before, a.ambient_degC.has_value());
-  std::string text = sentence + "\n";
-  Json changes = Json::object();
-  std::vector<Assignment> assignments;
-  for (const auto& [name, value] : offered.values) {
-    const auto old = before.find(name);
-    if (old == before.end() || old->second == value) continue;
-    const Target target = session.parameters().named(fmt::format("axis{}.{}", axis, name)).front();
-    assignments.push_back({target, value});
-    text += fmt::format("  {:<32} {:>11} -> {}\n", full_name(target), shown(old->second), shown(value));
-    changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
-  }
   Json result = {{"sentence", sentence},
                  {"verdict", answer.value("verdict", std::string())},
-                 {"changes", changes},
                  {"log", log},
                  {"model", std::filesystem::exists(model) ? Json(model) : Json()},
                  {"report", a.out + "/report.html"},
-                 {"written", false},
-                 {"saved", false}};
-  text += fmt::format("Log, model and report: {}\n", a.out);
-  result["note"] = offered.note;
+                 {"note", offered.note}};
+  const std::string text = fmt::format("{}\nLog, model and report: {}\n", sentence, a.out);
   if (offered.values.empty()) {
-    text += fmt::format("Nothing was written: {}.\n", offered.note);
-    return console.say(text, result);
+    result.update(put_in_force(console, axis, before, {}, a.consent).json);
+    return console.say(fmt::format("{}Nothing was written: {}.\n", text, offered.note), result);
   }
-  text += offered.note + ".\n";
-  for (const Assignment& assignment : assignments) check(assignment, "identify found ");
-  if (!console.options.json) fmt::print("{}", text);
-  if (!assignments.empty() && agreed(console, a)) {
-    session.set(assignments);
-    if (a.save) session.save();
-    result["written"] = true;
-    result["saved"] = a.save;
-    text = a.save ? "In force and saved.\n" : "In force until the next reset; 'hotcore save' keeps it.\n";
-  } else {
-    text = assignments.empty() ? "Nothing to write: the board has these values already.\n"
-                               : "Nothing was written; --yes writes without asking.\n";
-  }
-  console.say(text, result);
+  if (!console.options.json) fmt::print("{}{}.\n", text, offered.note);
+  const Outcome outcome = put_in_force(console, axis, before, offered.values, a.consent);
+  result.update(outcome.json);
+  console.say(outcome.text, result);
+}
+
+struct ModelArguments {
+  std::string axis = "0", file;
+  Consent consent;
+};
+
+/// The board takes what identify found elsewhere, from a log of any origin.
+void take_model(Console& console, const ModelArguments& a) {
+  const int axis = a.axis == "1" ? 1 : 0;
+  const Values before = values_of(console.session(), axis);
+  std::string why;
+  const Values found = parameters_of_model(a.file, before, why);
+  if (found.empty())
+    refuse_data(
+        fmt::format("{}: it has {}, which this board's parameters cannot express; run it with host-sim "
+                    "(--set model=FILE).",
+                    a.file, why));
+  const Outcome outcome = put_in_force(console, axis, before, found, a.consent);
+  console.say(outcome.text, outcome.json);
+}
+
+void add_consent(CLI::App& command, Consent& consent) {
+  command.add_flag("--yes", consent.yes, "write what was found without asking");
+  command.add_flag("--save", consent.save, "and keep it over a reset");
 }
 
 }  // namespace
+
+void add_model(CLI::App& app, Console& console) {
+  auto a = std::make_shared<ModelArguments>();
+  CLI::App* command = app.add_subcommand("model", "put a model of 'identify --write-model' in force");
+  command->add_option("file", a->file, "the model")->required();
+  command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
+  add_consent(*command, a->consent);
+  command->callback([&console, a] { take_model(console, *a); });
+}
 
 void add_identify(CLI::App& app, Console& console) {
   auto a = std::make_shared<Arguments>();
@@ -287,8 +335,7 @@ void add_identify(CLI::App& app, Console& console) {
       ->capture_default_str()
       ->check(between(0, 1));
   command->add_option("--out", a->out, "folder for log, model and report")->capture_default_str();
-  command->add_flag("--yes", a->yes, "write what was found without asking");
-  command->add_flag("--save", a->save, "and keep it over a reset");
+  add_consent(*command, a->consent);
   command->add_flag("--force", a->force, "write over the log that is in the folder");
   command->callback([&console, a] { identify(console, *a); });
 }

@@ -21,6 +21,14 @@ inline constexpr wire::ParameterInfo heat_dictionary[] = {
 };
 static_assert(wire::well_declared(heat_dictionary), "ids must rise, and a default must lie in its own range");
 
+/// Those from here on are what identify may find beside the others.
+inline constexpr std::uint16_t first_found_id = 0x0212;
+inline constexpr int found_count = [] {
+  int count = 0;
+  for (const wire::ParameterInfo& p : heat_dictionary) count += p.id >= first_found_id ? 1 : 0;
+  return count;
+}();
+
 [[nodiscard]] Finding validate(const HeatParameters& set);
 
 /// The three-phase motor. Only of a set that passed; the resistance is that of axis.params.

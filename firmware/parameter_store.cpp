@@ -160,6 +160,7 @@ wire::Answer ParameterStore::commit(Driver& driver) {
 
 wire::Answer ParameterStore::against_saving(const Driver& driver) const {
   if (!driver.at_rest()) return wire::refused(wire::Status::not_disarmed);
+  if (saved_count() > most_saved) return wire::refused(wire::Status::too_much_found);
   return check(in_force_, rating_);
 }
 
@@ -170,17 +171,38 @@ bool ParameterStore::unsaved() const {
 
 bool ParameterStore::uncommitted() const { return !same(staged_, in_force_); }
 
-void ParameterStore::encode(Record& record) const {
+bool ParameterStore::saved(int index) const {
+  if (index < always_saved) return true;
+  const float fallback = parameter_info(index)->fallback;
+  return !same(field(in_force_.axes[0], index), fallback) || !same(field(in_force_.axes[1], index), fallback);
+}
+
+int ParameterStore::saved_count() const {
+  int count = 0;
+  for (int i = 0; i < parameter_count; ++i) count += saved(i) ? 1 : 0;
+  return count;
+}
+
+/// Only of a set with no more than most_saved of them.
+std::span<std::uint32_t> ParameterStore::encode(Record& record) const {
+  std::uint16_t ids[most_saved + 1] = {};
+  const int count = saved_count();
   std::uint32_t* word = record + header_words;
   *word++ = version;
-  *word++ = parameter_count;
-  std::uint16_t ids[2 * id_words] = {};
-  for (int i = 0; i < parameter_count; ++i) ids[i] = parameter_info(i)->id;
-  std::memcpy(word, ids, sizeof ids);
+  *word++ = static_cast<std::uint32_t>(count);
+  int k = 0;
+  for (int i = 0; i < parameter_count; ++i) {
+    if (saved(i)) ids[k++] = parameter_info(i)->id;
+  }
+  const int id_words = (count + 1) / 2;
+  std::memcpy(word, ids, 4 * static_cast<std::size_t>(id_words));
   word += id_words;
   for (const AxisSet& set : in_force_.axes) {
-    for (int i = 0; i < parameter_count; ++i) std::memcpy(word++, &field(set, i), 4);
+    for (int i = 0; i < parameter_count; ++i) {
+      if (saved(i)) std::memcpy(word++, &field(set, i), 4);
+    }
   }
+  return {record, word};
 }
 
 /// Ids tell values apart, whatever firmware wrote them: what an older one did not know keeps its default; what this one

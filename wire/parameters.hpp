@@ -15,9 +15,9 @@ namespace wire {
 
 /// Suffix of a parameter's name. A unit that does not stand here fails to compile at the line that uses it.
 // clang-format off
-enum class Unit : std::uint8_t { A, V, s, Hz, rad, ohm, H, Wb, count, share, degC, K, K_per_W, J_per_K, W_per_K, per_K };
+enum class Unit : std::uint8_t { A, V, s, Hz, rad, ohm, H, Wb, count, share, degC, K, K_per_W, J_per_K, W_per_K, per_K, W, Nm, Nms, Nms2, Nm_per_A, ohms2 };
 
-inline constexpr const char* unit_texts[] = {"A", "V", "s", "Hz", "rad", "ohm", "H", "Wb", "count", "share", "degC", "K", "K/W", "J/K", "W/K", "1/K"};
+inline constexpr const char* unit_texts[] = {"A", "V", "s", "Hz", "rad", "ohm", "H", "Wb", "count", "share", "degC", "K", "K/W", "J/K", "W/K", "1/K", "W", "Nm", "Nms", "Nms2", "Nm/A", "ohms2"};
 // clang-format on
 constexpr const char* text_of(Unit unit) { return unit_texts[static_cast<int>(unit)]; }
 

@@ -1,31 +1,33 @@
 // SPDX-License-Identifier: MIT
 #include "console/heat_experiment.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
+#include "boards/host/heat_file.hpp"
+#include "console/dictionary.hpp"
+#include "firmware/heat_parameters.hpp"
+#include "thermal/losses.hpp"
+#include "thermal/motor_set.hpp"
+#include "thermal/network.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
 
 console::Values believed() {
-  return {{"phase_resistance_ohm", 0.5f},
-          {"inductance_d_H", 3e-5f},
-          {"flux_linkage_Wb", 4.33e-3f},
-          {"pole_pairs", 1.0f},
-          {"R1_K_per_W", 1.08f},
-          {"R2_K_per_W", 16.3f},
-          {"C1_J_per_K", 1.13f},
-          {"C2_J_per_K", 18.04f},
-          {"winding_max_degC", 155.0f},
-          {"ambient_degC", 40.0f},
-          {"housing_noise_K", 0.5f},
-          {"housing_offset_K", 0.0f},
-          {"copper_coefficient_per_K", 0.00393f}};
+  return {{"phase_resistance_ohm", 0.5f}, {"inductance_d_H", 3e-5f},
+          {"flux_linkage_Wb", 4.33e-3f},  {"pole_pairs", 1.0f},
+          {"R1_K_per_W", 1.08f},          {"R2_K_per_W", 16.3f},
+          {"C1_J_per_K", 1.13f},          {"C2_J_per_K", 18.04f},
+          {"winding_max_degC", 155.0f},   {"ambient_degC", 40.0f},
+          {"housing_noise_K", 0.5f},      {"housing_offset_K", 0.0f},
+          {"housing_lag_s", 0.0f},        {"copper_coefficient_per_K", 0.00393f}};
 }
 
 std::string file(const std::string& name, const std::string& text) {
@@ -80,7 +82,7 @@ TEST(HeatExperiment, AModelOfTwoResistorsBecomesParameters) {
   std::string why;
   const auto found = console::parameters_of_model(
       file("model.toml", two_resistors + "[housing_sensor]\nnode = 1\nlag_s = 2\noffset_K = -1.5\ngain_error = 0\n"),
-      why);
+      believed(), why);
   const console::Values expected = {{"C1_J_per_K", 0.5f},
                                     {"C2_J_per_K", 20.0f},
                                     {"R1_K_per_W", 2.0f},
@@ -94,17 +96,117 @@ TEST(HeatExperiment, AModelOfTwoResistorsBecomesParameters) {
 TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
   const auto refused = [](const std::string& text, const std::string& words) {
     std::string why;
-    EXPECT_TRUE(console::parameters_of_model(file("model.toml", text), why).empty());
+    EXPECT_TRUE(console::parameters_of_model(file("model.toml", text), believed(), why).empty());
     EXPECT_NE(why.find(words), std::string::npos) << why;
   };
   refused("[[node]]\ncapacity_J_per_K = 1\n", "further mass");
-  refused(two_resistors + "[[source]]\nnode = 1\ndrive = \"speed_rad_per_s\"\ngain = 0.1\n", "speed_rad_per_s");
+  refused(two_resistors + "[[source]]\nnode = 1\ndrive = \"enabled\"\ngain = 0.1\n", "enabled");
   refused(two_resistors + "[[link]]\nfrom = 1\nto = \"frame\"\nlaw = \"constant\"\nconductance_W_per_K = 0.1\n",
           "frame");
-  refused(two_resistors + "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.1\n",
+  refused(two_resistors + "[[link]]\nfrom = 0\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.1\n",
           "radiation");
-  refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n", "gain");
   refused(two_resistors + "[housing_sensor]\nnode = 0\n", "towards the winding");
+  // Firmware of before.
+  refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n",
+          "sensor_gain_share, which its firmware does not know");
+}
+
+/// All that this firmware can be told.
+console::Values told_to_this_firmware(float value) {
+  console::Values values = believed();
+  for (const wire::ParameterInfo& p : firmware::heat_dictionary) {
+    console::Description d;
+    d.name = p.name;
+    d.unit = wire::text_of(p.unit);
+    values.try_emplace(console::full_name(d), value);
+  }
+  return values;
+}
+
+/// What identify wrote is the same heat network on a board, told in parameters, as in host-sim, read from the file.
+TEST(HeatExperiment, ABoardRunsTheModelThatHostSimRuns) {
+  const std::string head =
+      "format = 1\n[[node]]\ncapacity_J_per_K = 0.9\nmax_degC = 155\n[[node]]\ncapacity_J_per_K = 20\n";
+  const auto sink = [](const std::string& law) {
+    return "[[link]]\nfrom = 0\nto = 1\nlaw = \"constant\"\nconductance_W_per_K = 0.8\n"
+           "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"" +
+           law + "\"\nconductance_W_per_K = 0.07\n" + (law == "constant" ? "" : "k = 0.3\n");
+  };
+  // Of a motor file that took the winding for twice the resistance of this board's.
+  const std::string copper = "[[source]]\nnode = 0\ndrive = \"current_A2\"\ngain = 1.5\ncoefficient_per_K = 0.004\n";
+  const std::string sensor = "[housing_sensor]\nnode = 1\nlag_s = 2\noffset_K = -1\ngain_error = 0.05\n";
+  const auto source = [](int node, const std::string& drive, double gain, const std::string& more = "") {
+    return fmt::format("[[source]]\nnode = {}\ndrive = \"{}\"\ngain = {}\n{}", node, drive, gain, more);
+  };
+  const std::string plain = head + sink("constant") + copper + sensor;
+  const std::pair<const char*, std::string> models[] = {
+      {"two resistors", plain},
+      {"speed cooling", head + sink("speed") + copper + sensor},
+      {"natural convection", head + sink("natural_convection") + copper + sensor},
+      {"radiation", plain + "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.05\n"},
+      {"further mass", head + "[[node]]\ncapacity_J_per_K = 60\n" + sink("constant") +
+                           "[[link]]\nfrom = 1\nto = 2\nlaw = \"constant\"\nconductance_W_per_K = 0.2\n" + copper +
+                           sensor},
+      {"winding eddy", plain + source(0, "speed2_rad2_per_s2", 1e-5)},
+      {"ac copper", plain + source(0, "current2_speed2", 1e-6, "coefficient_per_K = 0.004\n")},
+      {"bridge loss", plain + source(0, "current_A", 0.5)},
+      {"enabled loss", plain + source(0, "enabled", 2)},
+      {"constant heat", plain + source(1, "one", -1.5)},
+      {"speed loss", plain + source(1, "speed_rad_per_s", 2e-3)},
+      {"its square", plain + source(1, "speed2_rad2_per_s2", 1e-5)},
+      {"windage", plain + source(1, "speed3_rad3_per_s3", 1e-8)},
+      {"load friction", plain + source(1, "current_speed", 1e-3)},
+      {"board heat", plain + source(1, "current_A2", 0.1)},
+      {"two of them", plain + source(1, "speed_rad_per_s", 2e-3) + source(0, "enabled", 2)},
+  };
+  std::vector<double> ends_degC;
+  for (const auto& [name, text] : models) {
+    const std::string path = file("model.toml", text);
+    const thermal::HeatSet<double> host =
+        thermal::split_phases(boards::host::read_heat_model(path).set, 0.2);  // of twice the resistance
+
+    std::string why;
+    console::Values values = told_to_this_firmware(1.0f);  // what the model has none of must not stay
+    for (const auto& [key, value] : console::parameters_of_model(path, values, why)) values[key] = value;
+    ASSERT_EQ(why, "") << name;
+    float numbers[std::size(firmware::heat_dictionary)];
+    for (std::size_t i = 0; i < std::size(numbers); ++i) {
+      console::Description d;
+      d.name = firmware::heat_dictionary[i].name;
+      d.unit = wire::text_of(firmware::heat_dictionary[i].unit);
+      numbers[i] = d.name == "phase_coupling" ? 0.1f : values.at(console::full_name(d));
+    }
+    firmware::HeatParameters p;
+    std::memcpy(&p, numbers, sizeof p);
+    p.winding_max_degC = 155;
+    const thermal::HeatSet<double> board = firmware::heat_set(p, values.at("phase_resistance_ohm"));
+
+    ASSERT_EQ(board.node_count, host.node_count) << name;
+    EXPECT_NEAR(board.housing.gain_error, host.housing.gain_error, 1e-6) << name;
+    const thermal::HeatNetwork<double> a(host), b(board);
+    const auto steps_a = a.transition(0.1), steps_b = b.transition(0.1);
+    thermal::HeatNetwork<double>::Vector at = thermal::HeatNetwork<double>::Vector::Constant(host.node_count, 25),
+                                         bt = at;
+    double apart_K = 0;
+    for (int k = 0; k < 6000; ++k) {
+      thermal::HeatInput<> in{};
+      const double A2 = k % 900 < 300 ? 5 : 1, w = k % 700 < 300 ? 400 : 0;
+      for (int phase = 0; phase < 3; ++phase) in[thermal::phase_drive(phase)] = A2 * (phase == 0 ? 1.0 : 0.25);
+      in[thermal::Drive::current_A2] = A2;
+      in[thermal::Drive::current_A] = std::sqrt(A2);
+      in[thermal::Drive::enabled] = in[thermal::Drive::one] = 1;
+      thermal::set_speed(in, w);
+      in[thermal::Boundary::ambient] = 25;
+      at = a.step(steps_a, at, in);
+      bt = b.step(steps_b, bt, in);
+      apart_K = std::max(apart_K, (at - bt).cwiseAbs().maxCoeff());
+    }
+    // A gain of twice the resistance is half of the heat at the same conductances: scaled, the same temperatures.
+    EXPECT_LT(apart_K, 1e-3) << name << ": " << at.transpose() << " / " << bt.transpose();
+    ends_degC.push_back(at.maxCoeff());
+  }
+  for (std::size_t i = 1; i < ends_degC.size(); ++i)
+    EXPECT_GT(std::abs(ends_degC[i] - ends_degC[0]), 0.3) << models[i].first << " moves nothing, so nothing was shown";
 }
 
 nlohmann::json answer(double miss_K, bool determined) {

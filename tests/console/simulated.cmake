@@ -51,6 +51,19 @@ expect(identification_of_an_unknown_room 0 "left out, since it takes the motor f
 set(typed "set axis0.R1_K_per_W=0.7 axis0.C1_J_per_K=1.9\nidentify --turning --minutes 7 --out turned --ambient 25 --yes\nquit\n")
 expect(identification_of_the_winding 0 "axis0.C1_J_per_K +1.9 -> 1\\.[01].*axis0.R1_K_per_W +0.7 -> 1\\.[01].*In force until" ${sim})
 set(typed "")
+# What identify found elsewhere, put in force and saved.
+file(WRITE ${SCRATCH}/found.toml "format = 1
+[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n[[node]]\ncapacity_J_per_K = 20\n[[node]]\ncapacity_J_per_K = 80
+[[link]]\nfrom = 0\nto = 1\nlaw = \"constant\"\nconductance_W_per_K = 0.9
+[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"constant\"\nconductance_W_per_K = 0.05
+[[link]]\nfrom = 1\nto = 2\nlaw = \"constant\"\nconductance_W_per_K = 0.5
+[[source]]\nnode = 0\ndrive = \"current_A2\"\ngain = 0.75\ncoefficient_per_K = 0.00393
+[housing_sensor]\nnode = 1\n[trust]\npower = 0.03\ninner_resistance = 0.05\ncooling = 0.06\ncorrelation = -0.4\n")
+expect(model 0 "axis1.R2_K_per_W +16.3 -> 20.*axis1.third_mass_J_per_K +0 -> 80.*axis1.trust_power_share +0.2 -> 0.03.*In force and saved" ${sim} model found.toml --axis 1 --yes --save)
+expect(model_without_a_yes 0 "axis0.third_mass_path_K_per_W +1 -> 2.*Nothing was written; --yes" ${sim} model found.toml)
+file(WRITE ${SCRATCH}/spot.toml "format = 1\n[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n[[node]]\ncapacity_J_per_K = 20\n[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n[housing_sensor]\nnode = 1\n")
+expect(model_that_is_too_much 3 "^spot.toml: it has a hot spot, .*cannot express; run it with host-sim" ${sim} model spot.toml)
+expect(model_that_is_not_there 2 "^nowhere.toml" ${sim} model nowhere.toml)
 
 # An identify beside hotcore that ends as by Ctrl-C, which reaches both, and one that is killed.
 file(COPY ${HOTCORE} DESTINATION ${SCRATCH}/beside)

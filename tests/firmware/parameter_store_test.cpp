@@ -313,7 +313,8 @@ TEST(ParameterStore, ASavedSetIsInForceAfterTheNextStart) {
 TEST(ParameterStore, APowerCutInEachWordLeavesTheLastSetOrTheOneBefore) {
   int kept_old = 0, kept_new = 0;
   for (const std::uint32_t tear : {0x00000000u, 0xFFFFFFFFu, 0x5A5A5A5Au, 0x13371234u}) {
-    for (int cut = 0; cut <= 92; ++cut) {
+    constexpr int all_words = ParameterStore::record_words + 1;  // the last that is written may still be torn
+    for (int cut = 0; cut <= all_words; ++cut) {
       Bench b;
       b.put_in_force();
       ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
@@ -321,6 +322,7 @@ TEST(ParameterStore, APowerCutInEachWordLeavesTheLastSetOrTheOneBefore) {
       for (int i = 0; i < firmware::parameter_count; ++i) {  // every value differs in the second set
         const wire::ParameterInfo& info = *firmware::parameter_info(i);
         if (firmware::parameter_flags(i) & wire::whole_number) continue;
+        if (i >= ParameterStore::most_saved) continue;  // no more are saved
         for (std::uint8_t axis = 0; axis < 2; ++axis) {
           const float old = firmware::parameter_value(before.axes[axis], i);
           ASSERT_EQ(b.store.stage({{info.id, axis}, old != 0.0f ? 0.999f * old : 0.01f * info.max}).status, 0);
@@ -344,10 +346,10 @@ TEST(ParameterStore, APowerCutInEachWordLeavesTheLastSetOrTheOneBefore) {
                     firmware::parameter_value(meant.axes[axis], i))
               << "cut in word " << cut << ", " << firmware::parameter_info(i)->name;
       }
-      if (cut < 91) {
+      if (cut < all_words - 1) {
         EXPECT_FALSE(is_new && tear != 0) << cut;
       } else {
-        EXPECT_EQ(is_new, cut == 92 || tear == 0) << cut;
+        EXPECT_EQ(is_new, cut == all_words || tear == 0) << cut;
       }
       // And the next save goes beside the torn one.
       Driver driver{{bench::rating, {{}, {}}}};
@@ -452,6 +454,34 @@ TEST(ParameterStore, WhatWasStagedIsTakenBackToTheSavedOrToTheDefaults) {
   EXPECT_EQ(b.driver.axis(0).arm(), Status::parameters_unset);
 }
 
+/// What was found beside the two resistors is saved where there is any of it, on either axis, and back at its default
+/// it is forgotten.
+TEST(ParameterStore, WhatWasFoundBesideTwoResistorsIsSavedUpToFive) {
+  Bench b;
+  b.put_in_force();
+  const auto commit = [&](std::uint16_t id, std::uint8_t axis, float value) {
+    ASSERT_EQ(b.store.stage({{id, axis}, value}).status, 0);
+    ASSERT_EQ(b.store.commit(b.driver).status, 0);
+    b.tick(1);
+  };
+  const auto after_a_reset = [&] {
+    ParameterStore next(bench::rating);
+    EXPECT_EQ(next.start(b.flash).status, 0);
+    return next.in_force();
+  };
+  for (std::uint16_t id = 0x0213; id < 0x0218; ++id) commit(id, id % 2, 1e-3f);
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  EXPECT_EQ(after_a_reset().axes[1].heat.constant_heat_W, 1e-3f);
+  EXPECT_EQ(after_a_reset().axes[0].heat.constant_heat_W, 0.0f);
+  EXPECT_EQ(after_a_reset().axes[1].heat.load_friction_Nm_per_A, 1e-3f);
+  commit(0x0218, 0, 1e-3f);
+  EXPECT_EQ(b.store.save(b.driver, b.flash).status, code(Status::too_much_found));
+  commit(0x0213, 1, 0.0f);
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  EXPECT_EQ(after_a_reset().axes[1].heat.constant_heat_W, 0.0f);
+  EXPECT_EQ(after_a_reset().axes[0].heat.board_heat_ohm, 1e-3f);
+}
+
 TEST(ParameterStore, AStoreTooSmallForARecordHoldsNone) {
   Bench b;
   b.put_in_force();
@@ -477,14 +507,15 @@ TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {
     const wire::Answer answer = store.start(other);
     return std::pair(answer, store.in_force());
   };
-  // One that knew only half of the parameters: ids and values of the electrical list.
+  constexpr std::uint32_t all = ParameterStore::always_saved, values_at = 6 + all / 2;
+  // One that knew only some of the parameters: ids and values of the electrical list.
   const auto [older, migrated] = saved([](std::vector<std::uint32_t>& w) {
-    constexpr std::uint32_t n = 16, all = firmware::parameter_count;
+    constexpr std::uint32_t n = 16;
     std::vector<std::uint32_t> less(w.begin(), w.begin() + 4);
     less.insert(less.end(), {1, n});
     less.insert(less.end(), w.begin() + 6, w.begin() + 6 + n / 2);
     for (std::uint32_t axis = 0; axis < 2; ++axis)
-      less.insert(less.end(), w.begin() + 6 + all / 2 + axis * all, w.begin() + 6 + all / 2 + axis * all + n);
+      less.insert(less.end(), w.begin() + values_at + axis * all, w.begin() + values_at + axis * all + n);
     w = less;
   });
   EXPECT_EQ(older.status, code(Status::parameters_unset)) << "what it lacks has no default: named, and not armed";
@@ -494,13 +525,13 @@ TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {
   const auto [newer_version, none] = saved([](std::vector<std::uint32_t>& w) { w[4] = 2; });
   EXPECT_EQ(newer_version.status, code(Status::newer_record));
   EXPECT_TRUE(wire::is_unset(none.axes[0].drive.phase_resistance_ohm)) << "nothing of it is used";
-  const auto [newer_id, nothing] = saved([](std::vector<std::uint32_t>& w) { w[6 + 16] = 0x0999'0210; });
+  const auto [newer_id, nothing] = saved([](std::vector<std::uint32_t>& w) { w[values_at - 1] = 0x0999'0210; });
   EXPECT_EQ(newer_id.status, code(Status::newer_record));
   EXPECT_EQ(newer_id.id, 0x0999);
   EXPECT_TRUE(wire::is_unset(nothing.axes[0].drive.phase_resistance_ohm));
   const auto [inconsistent, kept] = saved([](std::vector<std::uint32_t>& w) {
     const float bad = 30.0f;  // current_limit: above the board's peak, under a right CRC
-    std::memcpy(&w[6 + 17 + 6], &bad, 4);
+    std::memcpy(&w[values_at + 6], &bad, 4);
   });
   EXPECT_EQ(inconsistent.status, code(Status::parameter_refused));
   EXPECT_EQ(inconsistent.id, 0x0111);
