@@ -284,7 +284,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   }
   if (unseen) {
     doing("scoring what was held out");
-    const Fit& tried = near ? found.chosen.fit : answer;
+    const Fit& tried = near ? found.chosen.fit : extended ? answer : compared;
     report.held_out = score_held_out(*unseen, problem, held, compared, tried, report);
     if (near) {
       report.held_out->nearest = ids_of(tried.chosen);

@@ -181,6 +181,32 @@ TEST(SlowReport, ALogWithoutTheColumnThatTheOthersAreExplainedByDoesNotSpeakAgai
   says(both.sentence, "untold.csv was left out: speed_rad_per_s is missing in it");
 }
 
+TEST(SlowReport, MassesThatAFanInOneLogBendsAreNotTakenForSwappedColumns) {
+  std::vector<identify::Log> logs;
+  for (const std::uint64_t seed : {10, 11, 12}) {
+    tests::BenchOptions options;
+    options.seed = seed;
+    options.seconds = 1800;
+    options.rate_Hz = 2;
+    options.core_every_s = 30;
+    options.core_white_K = 0.8;
+    options.motor.C2 = 10;
+    if (seed == 12) options.motor.R2 /= 2.2;
+    double mass_degC = options.start_degC;  // stepped with each of the four stages of 20 ms
+    options.extra_housing_W = [&](double, double, double housing_degC) {
+      const double taken_W = (housing_degC - mass_degC) / 3;
+      mass_degC += 0.005 * taken_W / 12;
+      return -taken_W;
+    };
+    logs.push_back(tests::bench_logs({options}).front());
+  }
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.sentence.find("swapped"), std::string::npos) << report.sentence;
+  ASSERT_FALSE(report.tied.empty()) << report.sentence;
+  for (const auto& ids : report.tied)
+    EXPECT_NE(std::find(ids.begin(), ids.end(), "cooling_change"), ids.end()) << report.sentence;
+}
+
 TEST(SlowReport, TwoEntriesOfOneIdAreToldApart) {
   tests::BenchOptions draught, fan;
   for (auto* o : {&draught, &fan}) o->core_every_s = 20;
