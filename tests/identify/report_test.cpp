@@ -208,6 +208,23 @@ TEST(SlowReport, MassesThatAFanInOneLogBendsAreNotTakenForSwappedColumns) {
   says(report.sentence, "noisy by 0.8 K");  // and not by what a fan alone leaves
 }
 
+TEST(SlowReport, AMassBesideARoomThatNobodyRecordedMayBeThatRoom) {
+  tests::BenchOptions options;
+  options.seconds = 1800;
+  options.core_every_s = 20;
+  double mass_degC = options.start_degC;  // stepped with each of the four stages of 20 ms
+  options.extra_housing_W = [&](double, double, double housing_degC) {
+    const double taken_W = (housing_degC - mass_degC) / 3;
+    mass_degC += 0.005 * taken_W / 12;
+    return -taken_W;
+  };
+  auto logs = tests::bench_logs({options});
+  logs[0].of(identify::Role::ambient).clear();
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  says(report.sentence, "third_mass");
+  says(report.sentence, "No ambient was recorded");
+}
+
 TEST(SlowReport, TwoEntriesOfOneIdAreToldApart) {
   tests::BenchOptions draught, fan;
   for (auto* o : {&draught, &fan}) o->core_every_s = 20;
