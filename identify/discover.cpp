@@ -175,6 +175,40 @@ std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log
   return report;
 }
 
+/// Where the logs together have no plain answer, or one that is of a log alone which lacks a column that others have:
+/// the answer of those that have all of them. What that column would tell may be all that sets the others apart.
+std::optional<Report> read_without_poorer_logs(const Found& found, const std::string& poor,
+                                               const std::vector<Log>& given,
+                                               const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
+                                               const Tell& doing) {
+  std::string notes;
+  std::vector<Log> whole;
+  std::vector<bool> lacks;
+  for (const Log& log : given) {
+    std::string missing;
+    for (const Role role : {Role::speed, Role::neighbour, Role::frame}) {
+      const bool elsewhere = std::any_of(given.begin(), given.end(), [&](const Log& other) { return other.has(role); });
+      if (elsewhere && !log.has(role)) missing = own_name(role);
+    }
+    lacks.push_back(!missing.empty());
+    if (missing.empty())
+      whole.push_back(log);
+    else
+      notes += fmt::format(" {} was left out: {} is missing in it, which may be why it does not go with the rest.",
+                           log.name, missing);
+  }
+  if (notes.empty() || whole.empty()) return std::nullopt;
+  const bool of_a_poorer =
+      std::any_of(found.chosen.fit.chosen.begin(), found.chosen.fit.chosen.end(),
+                  [&](const Chosen& c) { return c.log >= 0 && lacks[static_cast<std::size_t>(c.log)]; });
+  const bool plain = poor.empty() && (found.verdict == Verdict::adequate || names_causes(found.verdict));
+  if (plain && !of_a_poorer) return std::nullopt;
+  Report report = discover(whole, motor, held, doing);
+  if (report.verdict == Verdict::insufficient) return std::nullopt;
+  report.sentence += notes;
+  return report;
+}
+
 /// Why no board gets a set; empty when one does.
 std::string why_no_model(const Problem& problem, const std::vector<Log>& logs, const Fit& offered,
                          const std::string& poor) {
@@ -211,6 +245,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   auto [found, poor, misses, vetoed] = judged(problem, logs, motor, unseen.has_value(), doing);
   if (unseen && found.early_s > 0) unseen = heard(std::move(*unseen), found.early_s);
   widen_along_ridges(problem, found);
+  if (auto fewer = read_without_poorer_logs(found, poor, given, motor, held, doing)) return *fewer;
   if (auto sooner = read_a_row_sooner(rows_ahead(problem, found.chosen.fit), given, motor, held, doing)) return *sooner;
   const bool extended = poor.empty() && !found.chosen.fit.chosen.empty() && found.verdict != Verdict::unknown_cause;
   // What is no explanation may foretell better than two resistors all the same: told with what was held out, and no
@@ -249,7 +284,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
   }
   if (unseen) {
     doing("scoring what was held out");
-    const Fit& tried = near ? found.chosen.fit : answer;
+    const Fit& tried = near ? found.chosen.fit : extended ? answer : compared;
     report.held_out = score_held_out(*unseen, problem, held, compared, tried, report);
     if (near) {
       report.held_out->nearest = ids_of(tried.chosen);

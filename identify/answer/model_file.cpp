@@ -30,8 +30,13 @@ Eigen::MatrixXd doubts(const Fit& f) {
 }
 
 /// Of the logs, and of before and after their cooling changed, the one that heats most and cools least: a board cannot
-/// know whether the fan that a log had runs.
-Model<double> hottest_model_of(const Problem& problem, const Fit& f) {
+/// know whether the fan that a log had runs. What one log's room or sensor was, though, is not the motor's.
+Model<double> hottest_model_of(const Problem& problem, const Fit& fitted) {
+  Fit f = fitted;
+  for (Chosen& c : f.chosen) {
+    const Edit e = cause_of(c).edit;
+    if (e == Edit::source || e == Edit::sensor_offset || e == Edit::sensor_gain) c.log = -1;
+  }
   Model<double> hottest;
   double most_K_per_drive = -1;
   for (std::size_t l = 0; l < problem.logs.size(); ++l) {

@@ -269,14 +269,17 @@ double clocks_apart_s(const Problem& problem, const Found& found, const std::vec
 }
 
 /// With the two temperatures swapped, does one cause leave clearly less than the best does as they stand?
-bool follows_better_swapped(const Problem& problem, const Fit& best, std::vector<Log> logs,
+bool follows_better_swapped(const Problem& problem, const Found& found, std::vector<Log> logs,
                             const std::optional<wire::pc::MotorFile>& motor) {
+  const Fit& best = found.singles.front().fit;
   for (Log& log : logs) std::swap(log.of(Role::core), log.of(Role::housing));
   const Problem swapped = problem_of(logs, motor);
   const auto left_by_best = [&](const Problem& p) { return excess(fit(p, best.chosen, {&best})); };
   const double in_a_look = left_by_best(in_long_bins(problem));
   if (!(excess(best_alone(in_long_bins(swapped))) < in_a_look + std::abs(in_a_look) + clearly)) return false;
-  const double left = left_by_best(problem);
+  // What was found may explain all as it is read: two resistors, and one cause, are then bent by what it is of.
+  const double left =
+      std::min(left_by_best(problem), excess(fit(problem, found.chosen.fit.chosen, {&found.chosen.fit})));
   return excess(best_alone(swapped)) + clearly < std::min(left, fraction_left * left);
 }
 
@@ -415,7 +418,7 @@ std::string masses_in_each_others_place(const Problem& problem, const Found& fou
                                 [](const Bins& log) { return log.has_core && log.has_housing; });
   const double share = winding_of_housing(found);
   if (found.verdict != Verdict::adequate && !found.singles.empty() && both && share > heaviest_winding &&
-      follows_better_swapped(problem, found.singles.front().fit, logs, motor))
+      follows_better_swapped(problem, found, logs, motor))
     return fmt::format(
         "The winding would take up {:.0f} times the heat of the housing, as in no motor: see whether core_degC and "
         "housing_degC are swapped.",

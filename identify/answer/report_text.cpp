@@ -22,7 +22,7 @@ std::string rmse(const Rmse& r) {
     out += fmt::format("housing {:.2f} K rms, {:.1f} K worst", r.housing_K, r.housing_worst_K);
   if (!std::isnan(r.core_K))
     out += fmt::format("{}winding {:.2f} K rms, {:.1f} K worst", out.empty() ? "" : "; ", r.core_K, r.core_worst_K);
-  return out.empty() ? "nothing was measured there" : out;
+  return out.empty() ? "no figure" : out;
 }
 
 std::string two_resistors(const Report& r) {

@@ -80,12 +80,24 @@ bool Problem::possible(const Cause& cause) const {
       return any([](const Bins& b) { return b.has_frame; });
     case Needs::several_logs:
       return logs.size() > 1;
+    case Needs::several_housings:
+      return std::count_if(logs.begin(), logs.end(), [](const Bins& b) { return b.has_housing; }) > 1;
     case Needs::logs_of_power:
       return logs.size() > 1 && heated_by_power();
     case Needs::logs_of_current:
       return logs.size() > 1 && amps;
   }
   return true;
+}
+
+std::string column_lacking(const std::vector<Chosen>& chosen, const Bins& log) {
+  for (const Chosen& c : chosen) {
+    const Needs needs = cause_of(c).needs;
+    if (needs == Needs::speed && !log.has_speed) return own_name(Role::speed);
+    if (needs == Needs::neighbour && !log.has_neighbour) return own_name(Role::neighbour);
+    if (needs == Needs::frame && !log.has_frame) return own_name(Role::frame);
+  }
+  return "";
 }
 
 void warm_phases_unequally(Problem& problem) {

@@ -76,6 +76,10 @@ struct Problem {
   void warm_unevenly(double per_A2);        // changes the inputs to this uneven_per_A2
 };
 
+/// The column that `chosen` goes by and that this log does not have: what it explains elsewhere cannot be seen there.
+/// Empty: it has all.
+std::string column_lacking(const std::vector<Chosen>& chosen, const Bins& log);
+
 /// A standing rotor's phases take unequal heat P_k and warm unequally, and the warmer ones then take more still:
 /// wherever it stands, alpha R_u sum (P_k - P/3)^2 = alpha R_u P^2 / 6 above P, the heat of equal phases, with one P as
 /// long ago as phases of C1/3 need to warm. Between one phase and the others lies R_u: 0 where they share their heat at

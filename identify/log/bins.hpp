@@ -59,7 +59,8 @@ struct Bins {
   bool torque_for_A = false;    // as in Log
   bool sink_assumed = false;    // to be as warm as what the log begins at
   bool sink_unwatched = false;  // or as a person said once: how it moved is not known
-  bool has_power = false, has_frame = false, has_neighbour = false, has_core = false, has_housing = false;
+  bool has_power = false, has_speed = false, has_frame = false, has_neighbour = false, has_core = false,
+       has_housing = false;
   std::vector<Start> starts = {Start{}};         // the first at bin 0
   bool begins_warm = false;                      // or cold: the housing at another temperature than the sink
   double housing_noise_K = 0, core_noise_K = 0;  // of one raw reading, from its differences

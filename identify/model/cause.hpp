@@ -66,6 +66,7 @@ enum class Needs {
   frame,
   several_currents,
   several_logs,
+  several_housings,
   logs_of_power,
   logs_of_current,
   copper,
@@ -94,7 +95,8 @@ int cause_named(const std::string& id);
 
 /// The cause is of one log among several, and may be chosen for each of them.
 inline bool of_one_log(const Cause& cause) {
-  return cause.edit == Edit::cooling_of_log || cause.edit == Edit::power_of_log || cause.edit == Edit::current_of_log;
+  return cause.needs == Needs::several_logs || cause.needs == Needs::several_housings ||
+         cause.needs == Needs::logs_of_power || cause.needs == Needs::logs_of_current;
 }
 
 /// A cause chosen for a fit; `log` only for causes of one log, -1 otherwise.
@@ -112,7 +114,7 @@ inline constexpr double least_lag_s = 0.02;  // of a sensor that lags: none at a
 template <class S>
 void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log, Model<S>& model) {
   auto& set = model.set;
-  const bool here = chosen.log == static_cast<int>(log);
+  if (of_one_log(cause) && chosen.log != static_cast<int>(log)) return;
   const auto ambient = set.links[model.sink_link].to;
   const auto add_link = [&](int from, int to, thermal::LinkLaw law, const S& conductance) {
     set.links[set.link_count++] = {static_cast<std::int8_t>(from), static_cast<std::int8_t>(to), law, conductance,
@@ -168,15 +170,15 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
       model.cooling_changes = true;
       break;
     case Edit::cooling_of_log:
-      if (here) set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
+      set.links[model.sink_link].conductance_W_per_K = set.links[model.sink_link].conductance_W_per_K * k[0];
       break;
     case Edit::power_of_log:
-      for (int s = 0; here && s < set.source_count; ++s) {
+      for (int s = 0; s < set.source_count; ++s) {
         if (set.sources[s].drive == thermal::Drive::power_W) set.sources[s].gain = set.sources[s].gain * k[0];
       }
       break;
     case Edit::current_of_log:
-      for (int s = 0; here && s < set.source_count; ++s) {
+      for (int s = 0; s < set.source_count; ++s) {
         auto& source = set.sources[s];
         if (thermal::is_current_square(source.drive) || source.drive == thermal::Drive::current2_speed2)
           source.gain = source.gain * k[0] * k[0];
@@ -196,10 +198,10 @@ void apply(const Cause& cause, const S* k, const Chosen& chosen, std::size_t log
       model.winding_lags = true;
       break;
     case Edit::sensor_offset:
-      set.housing.offset_K = k[0];
+      set.housing.offset_K += k[0];
       break;
     case Edit::sensor_gain:
-      set.housing.gain_error = k[0];
+      set.housing.gain_error += k[0];
       break;
     case Edit::sensor_share:
       model.sensor_share = k[0];

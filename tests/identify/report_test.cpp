@@ -95,6 +95,136 @@ TEST(Report, AFanInOneLogIsNotCarriedIntoAnother) {
   EXPECT_GT(scored.before.core_K, 2);
 }
 
+TEST(Report, AMotorThatWouldGlowUnderWhatWasHeldOutIsSaidTo) {
+  const auto problem = identify::problem_of(tests::bench_logs({{}}), tests::ec_16());
+  identify::HoldOut held;
+  held.logs = tests::bench_logs({{}});
+  identify::Fit base = identify::fit(problem, {}), lost = base;
+  lost.x.head(2).array() += 6;  // as of a log without load: R1 and R2 are anything
+  const auto scored = [&](const identify::Fit& before, const identify::Fit& after) {
+    identify::Report report;
+    return identify::score_held_out(identify::unseen_of(problem, {}, held), problem, held, before, after, report);
+  };
+  says(scored(lost, lost).against, "the model as fitted would glow");
+  const identify::HeldOutScore better = scored(lost, base);
+  says(better.against, "two resistors as fitted would glow");
+  EXPECT_TRUE(std::isnan(better.before.housing_K));
+  EXPECT_LT(better.after.housing_K, 1);
+  EXPECT_EQ(scored(base, base).against, "");
+}
+
+/// Two logs of one motor, the second of which differs in one thing.
+template <class Change>
+identify::Report of_two_logs(Change change) {
+  tests::BenchOptions one, other;
+  for (auto* o : {&one, &other}) o->core_every_s = 20;
+  other.seed = 2;
+  auto logs = tests::bench_logs({one, other});
+  logs[0].name = "one.csv";
+  logs[1].name = "other.csv";
+  change(logs[1]);
+  return identify::discover(logs, tests::ec_16());
+}
+
+TEST(SlowReport, WhatIsOtherInOneLogAloneIsNamedForIt) {
+  const auto expect = [](const identify::Report& report, const char* id) {
+    ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+    EXPECT_TRUE(names_causes(report.verdict)) << report.sentence;
+    EXPECT_EQ(report.causes[0].id, id);
+    says(report.causes[0].name, "here: other.csv");
+    // Of that log, and not of the motor that a board is handed.
+    EXPECT_EQ(report.model_toml.find("\"one\""), std::string::npos) << report.model_toml;
+  };
+  expect(of_two_logs([](identify::Log& log) {
+           for (double& x : log.of(identify::Role::housing)) x += 3;
+         }),
+         "sensor_offset");
+  expect(of_two_logs([](identify::Log& log) {
+           for (double& x : log.of(identify::Role::housing)) x += 0.08 * (x - 25);
+         }),
+         "sensor_gain");
+  expect(of_two_logs([](identify::Log& log) {
+           for (double& x : log.of(identify::Role::ambient)) x += 5;
+         }),
+         "constant_heat");
+}
+
+/// Heat that goes by a speed: a bench's rotor stands, and is said to turn.
+identify::Log turning(std::uint64_t seed, const char* name) {
+  tests::BenchOptions options;
+  options.core_every_s = 20;
+  options.seed = seed;
+  const auto speed = [seed](double t) {
+    return std::fmod(t, 70.0 + 20.0 * static_cast<double>(seed)) < 60 ? 100.0 : 0.0;
+  };
+  options.extra_housing_W = [speed](double t, double, double) { return 0.02 * speed(t); };
+  identify::Log log = tests::bench_logs({options}).front();
+  log.name = name;
+  for (std::size_t k = 0; k < log.of(identify::Role::time).size(); ++k)
+    log.of(identify::Role::speed)[k] = speed(log.of(identify::Role::time)[k]);
+  return log;
+}
+
+TEST(SlowReport, ALogWithoutTheColumnThatTheOthersAreExplainedByDoesNotSpeakAgainstThem) {
+  const identify::Log told = turning(1, "told.csv");
+  identify::Log untold = turning(2, "untold.csv");
+  untold.of(identify::Role::speed).clear();
+  identify::HoldOut held;
+  held.logs = {untold};
+  const identify::Report alone = identify::discover({told}, tests::ec_16(), held);
+  ASSERT_EQ(alone.causes.size(), 1u) << alone.sentence;
+  EXPECT_EQ(alone.sentence.find("do not rely"), std::string::npos) << alone.sentence;
+  says(alone.sentence, "speed_rad_per_s, which what was found goes by, is missing in untold.csv");
+  const identify::Report both = identify::discover({told, untold}, tests::ec_16());
+  ASSERT_EQ(both.causes.size(), 1u) << both.sentence;
+  EXPECT_EQ(both.causes[0].id, alone.causes[0].id) << both.sentence;
+  says(both.sentence, "untold.csv was left out: speed_rad_per_s is missing in it");
+}
+
+TEST(SlowReport, MassesThatAFanInOneLogBendsAreNotTakenForSwappedColumns) {
+  std::vector<identify::Log> logs;
+  for (const std::uint64_t seed : {10, 11, 12}) {
+    tests::BenchOptions options;
+    options.seed = seed;
+    options.seconds = 1800;
+    options.rate_Hz = 2;
+    options.core_every_s = 30;
+    options.core_white_K = 0.8;
+    options.motor.C2 = 10;
+    if (seed == 12) options.motor.R2 /= 2.2;
+    double mass_degC = options.start_degC;  // stepped with each of the four stages of 20 ms
+    options.extra_housing_W = [&](double, double, double housing_degC) {
+      const double taken_W = (housing_degC - mass_degC) / 3;
+      mass_degC += 0.005 * taken_W / 12;
+      return -taken_W;
+    };
+    logs.push_back(tests::bench_logs({options}).front());
+  }
+  const identify::Report report = identify::discover(logs, std::nullopt);
+  EXPECT_EQ(report.sentence.find("swapped"), std::string::npos) << report.sentence;
+  ASSERT_FALSE(report.tied.empty()) << report.sentence;
+  for (const auto& ids : report.tied)
+    EXPECT_NE(std::find(ids.begin(), ids.end(), "cooling_change"), ids.end()) << report.sentence;
+  says(report.sentence, "noisy by 0.8 K");  // and not by what a fan alone leaves
+}
+
+TEST(SlowReport, AMassBesideARoomThatNobodyRecordedMayBeThatRoom) {
+  tests::BenchOptions options;
+  options.seconds = 1800;
+  options.core_every_s = 20;
+  double mass_degC = options.start_degC;  // stepped with each of the four stages of 20 ms
+  options.extra_housing_W = [&](double, double, double housing_degC) {
+    const double taken_W = (housing_degC - mass_degC) / 3;
+    mass_degC += 0.005 * taken_W / 12;
+    return -taken_W;
+  };
+  auto logs = tests::bench_logs({options});
+  logs[0].of(identify::Role::ambient).clear();
+  const identify::Report report = identify::discover(logs, tests::ec_16());
+  says(report.sentence, "third_mass");
+  says(report.sentence, "No ambient was recorded");
+}
+
 TEST(SlowReport, TwoEntriesOfOneIdAreToldApart) {
   tests::BenchOptions draught, fan;
   for (auto* o : {&draught, &fan}) o->core_every_s = 20;
