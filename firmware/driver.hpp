@@ -52,6 +52,7 @@ class Driver {
  private:
   thermal::GovernorSettings governor_;
   thermal::BoardHeat board_heat_;
+  float board_A_[axis_count] = {-1.0f, -1.0f};  // what it leaves each axis; negative: nothing said yet
   Axis axes_[axis_count];
 };
 
