@@ -181,10 +181,15 @@ std::string why_no_model(const Problem& problem, const std::vector<Log>& logs, c
   if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
   if (problem.heated_by_power()) return "the log tells a power and a board measures a current; record current_A";
   if (!problem.in_amperes()) return "the log tells a torque and a board measures a current; give --motor FILE";
+  const auto needs = [&](Needs what) {
+    return std::any_of(offered.chosen.begin(), offered.chosen.end(),
+                       [what](const Chosen& c) { return cause_of(c).needs == what; });
+  };
+  // As warm as a board would have to take it, a frame that cools would not cool: the housing sensor would be doubted.
+  if (needs(Needs::frame))
+    return "it goes by the temperature of the frame, which no board measures; run the board with the motor's sheet";
   const auto guessed = std::find_if(logs.begin(), logs.end(), [](const Log& log) { return log.speed_guessed; });
-  const bool by_speed = std::any_of(offered.chosen.begin(), offered.chosen.end(),
-                                    [](const Chosen& c) { return cause_of(c).needs == Needs::speed; });
-  if (guessed != logs.end() && by_speed)
+  if (guessed != logs.end() && needs(Needs::speed))
     return fmt::format("it goes by speed, whose unit nobody told; say {}, or :rpm or :rev/s",
                        column_in(*guessed, Role::speed, "rad/s"));
   return "";

@@ -735,6 +735,33 @@ TEST(Driver, WhatTheOtherTakesAtOnceComesDownInSmallSteps) {
   EXPECT_LE(steepest_A, 0.02f * bench::rating.peak_A * 1.001f);
 }
 
+/// An axis without a housing sensor beside one whose housing stays at 90 degC, where what it is bolted to is as warm as
+/// the hotter of both.
+TEST(Driver, AMotorThatItsNeighbourHeatsIsNotTakenForColder) {
+  enum class Seen { reading, estimate };
+  for (const thermal::Boundary warm : {thermal::Boundary::neighbour, thermal::Boundary::frame}) {
+    for (const Seen seen : {Seen::reading, Seen::estimate}) {
+      firmware::DriverSetup setup = bench::driver_setup();
+      thermal::HeatSet<double>& heat = setup.axes[0].heat = thermal::two_resistor_set(bench::motor());
+      heat.nodes[1].capacity_J_per_K = 20.0;
+      heat.links[heat.link_count++] = {1, thermal::boundary_end(warm), thermal::LinkLaw::constant, 0.3, 0.0};
+      setup.axes[0].senses_housing = false;
+      setup.axes[1].heat.nodes[3].capacity_J_per_K = 1e6;
+      firmware::Driver driver(setup);
+      const double J_per_K = 20.0 + heat.nodes[0].capacity_J_per_K;
+      double housing_degC = 40.0;  // the ambient believed
+      for (int i = 0; i < 20000; ++i) {
+        driver.slow_tick({}, {{{0.0f, false}}, {{90.0f, seen == Seen::reading || i < 100}}});
+        housing_degC += 0.01 / J_per_K * (0.3 * (90.0 - housing_degC) - (housing_degC - 40.0) / 7.4);
+        if (i > 200) {
+          EXPECT_GT(static_cast<double>(driver.axis(0).state().housing_degC), housing_degC - 1.0) << i;
+        }
+      }
+      EXPECT_GT(housing_degC, 70.0) << "or nothing was shown";
+    }
+  }
+}
+
 // ---- heat -----------------------------------------------------------------------------------------------------------
 
 TEST_F(Running, TheSlowLaneGetsTheSquareOfTheCurrent) {
