@@ -89,7 +89,6 @@ class HeatNetwork {
   }
 
   int size() const { return n_; }
-  const Matrix& rate_matrix_per_s() const { return a_; }
   const Scalar& capacity_J_per_K(int node) const { return capacity_J_per_K_[node]; }
 
   Transition<Scalar, N> transition(double dt_s) const {

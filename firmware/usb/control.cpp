@@ -76,7 +76,7 @@ bool allowed(const Setup& s) {
 
 void Control::reset() {
   address_ = 0;
-  configured_ = terminal_ready_ = receiving_ = short_end_ = false;
+  configured_ = receiving_ = short_end_ = false;
   halted_ = 0;
   left_ = {nullptr, 0};
 }
@@ -98,7 +98,6 @@ Order Control::setup(const std::uint8_t* raw) {
       return answer({line_.raw, sizeof line_.raw}, s);
     default:
       if (s.value > 3) return Order::refuse;  // PSTN table 18: two bits
-      terminal_ready_ = (s.value & 1) != 0;
       return Order::acknowledge;
   }
 }
@@ -114,7 +113,6 @@ Order Control::standard(const Setup& s) {
     case set_configuration:
       if (s.value > 1 || address_ == 0) return Order::refuse;
       configured_ = s.value == 1;
-      terminal_ready_ = false;
       halted_ = 0;
       argument_ = static_cast<std::uint8_t>(s.value);
       return Order::configure;

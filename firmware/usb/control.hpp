@@ -57,7 +57,6 @@ class Control {
 
   bool configured() const { return configured_; }
   bool halted(std::uint8_t endpoint) const { return (halted_ & halt_bit(endpoint)) != 0; }
-  bool terminal_ready() const { return terminal_ready_; }
   const Identity& identity() const { return *identity_; }
 
  private:
@@ -73,7 +72,7 @@ class Control {
 
   const Identity* identity_;
   std::uint8_t address_ = 0, argument_ = 0;
-  bool configured_ = false, terminal_ready_ = false;
+  bool configured_ = false;
   std::uint16_t halted_ = 0;
   LineCoding line_;
 
