@@ -195,6 +195,13 @@ std::string why_no_model(const Problem& problem, const std::vector<Log>& logs, c
   return "";
 }
 
+std::string why_no_experiment(const Problem& problem, Verdict verdict) {
+  if (verdict == Verdict::insufficient) return "the log is too little for a verdict";
+  if (verdict != Verdict::ambiguous) return "no causes tie";
+  if (!problem.in_amperes()) return "the log tells no current that could be asked for";
+  return "no course known here tells the tied causes apart and keeps the winding cool enough";
+}
+
 }  // namespace
 
 Report discover(const std::vector<Log>& given, const std::optional<wire::pc::MotorFile>& motor, const HoldOut& held,
@@ -252,6 +259,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.experiment = experiment(problem, found, most_A(problem, motor));
     say(problem, found, report);
   }
+  if (!report.experiment) report.no_experiment = why_no_experiment(problem, found.verdict);
   if (unseen) {
     doing("scoring what was held out");
     const Fit& tried = near ? found.chosen.fit : answer;
