@@ -30,7 +30,8 @@ constexpr const char* exit_codes =
 
 void add_options(CLI::App& app, Console& console) {
   app.add_option("--serial", console.options.serial, "the board whose serial begins so");
-  app.add_flag("--sim", console.options.sim, "a simulated board in this process");
+  app.add_flag("--sim", console.options.sim,
+               "a simulated board in this process (HOTCORE_SIM_FAST=1: faster than real time)");
   app.add_flag("--json", console.options.json, "answer in JSON, one object a line");
 }
 

@@ -171,7 +171,8 @@ Values parameters_of_model(const std::string& path, const Values& before, std::s
   if (!(scale > 0)) return why = "no heat by the current", Values{};
   const auto put = [&](const std::string& name, double value) { found[name] = static_cast<float>(value); };
   // What a model does not have, it has none of.
-  for (const char* none : {"sensor_gain_share", "radiation_W_per_K", "third_mass_J_per_K"}) found[none] = 0;
+  for (const char* none : {"sensor_gain_share", "radiation_W_per_K", "neighbour_heat_W_per_K", "third_mass_J_per_K"})
+    found[none] = 0;
   for (const auto& source : board_sources) found[source.parameter] = 0;
   for (const auto& law : board_laws) found[law.parameter] = 0;
 
@@ -189,6 +190,8 @@ Values parameters_of_model(const std::string& path, const Values& before, std::s
       put("R1_K_per_W", 1 / W_per_K);
     else if (constant && to.empty() && mass && std::min(from, to_node) == 1 && std::max(from, to_node) == 2)
       put("third_mass_path_K_per_W", 1 / W_per_K);
+    else if (from == 1 && to == "neighbour" && constant)
+      put("neighbour_heat_W_per_K", W_per_K);
     else if (from == 1 && to == "ambient" && law == "radiation")
       put("radiation_W_per_K", W_per_K);
     else if (from == 1 && to == "ambient" && (constant || known != std::end(board_laws))) {

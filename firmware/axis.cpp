@@ -311,9 +311,10 @@ FaultRecord Axis::fault() const {
 
 // ---- slow lane ------------------------------------------------------------------------------------------------------
 
-void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board) {
+void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, float neighbour_degC) {
   const HeatSums sums = heat_.take();
   input_ = heat_input(sums);
+  surround(neighbour_degC);
   // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
   const float came_steps = static_cast<float>(sums.periods) * period_s_ * slow_Hz;
   owed_steps_ += came_steps;
@@ -409,11 +410,6 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
     thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }
   input[thermal::Drive::one] = 1.0;
-  // Nobody measures these here: as warm as the surroundings are believed to be.
-  const double around_degC = core_.estimate().ambient_degC;
-  input[thermal::Boundary::coolant] = around_degC;
-  input[thermal::Boundary::frame] = around_degC;
-  input[thermal::Boundary::neighbour] = around_degC;
   return input;
 }
 
@@ -437,6 +433,16 @@ void Axis::fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) cons
   input[thermal::Drive::current_A2] = vector_A2;
   const double mean_A2 = sampled_A2 + static_cast<double>(unseen_.of_mean_A2);
   input[thermal::Drive::current_A] = std::sqrt(mean_A2 < 0.0 ? 0.0 : mean_A2);
+}
+
+/// Nobody measures the coolant: as warm as the surroundings are believed to be. Nor a frame; the two motors warm it, so
+/// it is no warmer than the hotter of them, and that is what it is taken for: colder than it is, it would seem to cool.
+void Axis::surround(float neighbour_degC) {
+  const thermal::Estimate& now = core_.estimate();
+  const double beside_degC = std::fmax(now.ambient_degC, static_cast<double>(neighbour_degC));
+  input_[thermal::Boundary::coolant] = now.ambient_degC;
+  input_[thermal::Boundary::neighbour] = beside_degC;
+  input_[thermal::Boundary::frame] = std::fmax(beside_degC, now.housing_degC);
 }
 
 /// What the whole steps that stand for it are charged with.

@@ -116,7 +116,8 @@ class Axis {
   [[nodiscard]] hal::Duty tick(const hal::AxisSample& sample) noexcept;
 
   /// Every 10 ms, from one context below the control interrupt. `board`: what the shared power stage leaves this axis.
-  void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board);
+  /// `neighbour_degC`: how warm the other axis' housing may be.
+  void slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, float neighbour_degC);
   /// Every millisecond, from the same context: what no single sample shows, of faults and of heat. Not twice on one
   /// sample.
   void watch();
@@ -188,6 +189,7 @@ class Axis {
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   void fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) const;
+  void surround(float neighbour_degC);
   thermal::HeatInput<> charged(thermal::HeatInput<> input) const;
   thermal::Unseen unseen_now() const;
   thermal::Unseen take_unseen();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The whole driver: two axes on one power stage. A board's control interrupt calls axis(i).tick for each axis, its main
 // loop watch every millisecond and slow_tick every 10 ms; nothing else couples the axes but the heat of the board they
-// share. No statics, no heap: a board owns one Driver, a PC may own many.
+// share and of each other's housing. No statics, no heap: a board owns one Driver, a PC may own many.
 #pragma once
 
 #include "firmware/axis.hpp"
@@ -52,6 +52,7 @@ class Driver {
  private:
   thermal::GovernorSettings governor_;
   thermal::BoardHeat board_heat_;
+  float board_A_[axis_count] = {-1.0f, -1.0f};  // what it leaves each axis; negative: nothing said yet
   Axis axes_[axis_count];
 };
 

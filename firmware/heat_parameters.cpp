@@ -55,6 +55,9 @@ void add_found(const HeatParameters& p, thermal::HeatSet<double>& set) {
   if (p.radiation_W_per_K != 0.0f)
     set.links[set.link_count++] = {housing, thermal::boundary_end(thermal::Boundary::ambient),
                                    thermal::LinkLaw::radiation, static_cast<double>(p.radiation_W_per_K), 0.0};
+  if (p.neighbour_heat_W_per_K != 0.0f)
+    set.links[set.link_count++] = {housing, thermal::boundary_end(thermal::Boundary::neighbour),
+                                   thermal::LinkLaw::constant, static_cast<double>(p.neighbour_heat_W_per_K), 0.0};
   if (p.third_mass_J_per_K == 0.0f) return;
   const auto mass = static_cast<std::int8_t>(set.node_count++);
   set.nodes[mass] = {static_cast<double>(p.third_mass_J_per_K), std::numeric_limits<float>::infinity()};

@@ -215,13 +215,25 @@ std::string why_no_model(const Problem& problem, const std::vector<Log>& logs, c
   if (!poor.empty()) return "this log cannot tell; run the board with the motor's sheet";
   if (problem.heated_by_power()) return "the log tells a power and a board measures a current; record current_A";
   if (!problem.in_amperes()) return "the log tells a torque and a board measures a current; give --motor FILE";
+  const auto needs = [&](Needs what) {
+    return std::any_of(offered.chosen.begin(), offered.chosen.end(),
+                       [what](const Chosen& c) { return cause_of(c).needs == what; });
+  };
+  // As warm as a board would have to take it, a frame that cools would not cool: the housing sensor would be doubted.
+  if (needs(Needs::frame))
+    return "it goes by the temperature of the frame, which no board measures; run the board with the motor's sheet";
   const auto guessed = std::find_if(logs.begin(), logs.end(), [](const Log& log) { return log.speed_guessed; });
-  const bool by_speed = std::any_of(offered.chosen.begin(), offered.chosen.end(),
-                                    [](const Chosen& c) { return cause_of(c).needs == Needs::speed; });
-  if (guessed != logs.end() && by_speed)
+  if (guessed != logs.end() && needs(Needs::speed))
     return fmt::format("it goes by speed, whose unit nobody told; say {}, or :rpm or :rev/s",
                        column_in(*guessed, Role::speed, "rad/s"));
   return "";
+}
+
+std::string why_no_experiment(const Problem& problem, Verdict verdict) {
+  if (verdict == Verdict::insufficient) return "the log is too little for a verdict";
+  if (verdict != Verdict::ambiguous) return "no causes tie";
+  if (!problem.in_amperes()) return "the log tells no current that could be asked for";
+  return "no course known here tells the tied causes apart and keeps the winding cool enough";
 }
 
 }  // namespace
@@ -282,6 +294,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.experiment = experiment(problem, found, most_A(problem, motor));
     say(problem, found, report);
   }
+  if (!report.experiment) report.no_experiment = why_no_experiment(problem, found.verdict);
   if (unseen) {
     doing("scoring what was held out");
     const Fit& tried = near ? found.chosen.fit : extended ? answer : compared;

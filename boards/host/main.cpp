@@ -189,6 +189,7 @@ int main(int argc, char** argv) {
       ->type_name("MINUTES");
   record_command->add_option("--seed", recording.seed, "of excitation and noise")
       ->capture_default_str()
+      ->check(wire::pc::between(0, wire::pc::most_seed))
       ->type_name("N");
   record_command
       ->add_option("--hide", hide,

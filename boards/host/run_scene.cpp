@@ -158,6 +158,8 @@ host_sim::BenchDesign Board::plant(const Scene& scene, const wire::pc::MotorFile
   const firmware::BoardRating rating = rating_of(scene.board);
   design.bridge.pwm_Hz = static_cast<double>(rating.pwm_Hz);
   design.bridge.dead_time_s = static_cast<double>(rating.dead_time_s);
+  design.power_stage =
+      host_sim::power_stage_from_rating(design.bridge, design.supply.open_V, static_cast<double>(rating.continuous_A));
   const double larger = static_cast<double>(rating.peak_A / dual_48V_20A.peak_A);
   design.sensors.current_A_per_count *= larger;
   design.sensors.bus_A_per_count *= larger;

@@ -5,6 +5,9 @@
 
 namespace boards::host {
 
+/// Than the room around the motors: the board's own electronics warm the air in its case. 40 degC in an ordinary room.
+constexpr double case_warmer_K = 15;
+
 host_sim::HeatOptions heat_options(const Scene& scene) {
   host_sim::HeatOptions options;
   options.coolant_R2_K_per_W = scene.coolant_K_per_W;
@@ -18,6 +21,7 @@ host_sim::BenchDesign bench_of(const Scene& scene, const wire::Motor& motor) {
   design.supply.can_sink = scene.supply_sinks;
   design.start_degC = scene.start_degC;
   design.ambient_degC = scene.ambient_degC;
+  design.board_ambient_degC = scene.ambient_degC + case_warmer_K;
   return design;
 }
 

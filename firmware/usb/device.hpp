@@ -65,7 +65,6 @@ class Device {
   }
 
   bool configured() const { return control_.configured(); }
-  bool suspended() const { return suspended_; }
 
  private:
   struct Endpoints {

@@ -67,7 +67,6 @@ class Core {
   void set_ticks_per_cycle(Time t) { ticks_per_instruction_ = t * cycles_per_instruction_; }
   void set_cycles_per_instruction(unsigned n) { cycles_per_instruction_ = n; }
 
-  bool sleeping() const { return sleeping_; }
   bool exited() const { return exited_; }
   int exit_code() const { return exit_code_; }
   bool locked_up() const { return locked_up_; }

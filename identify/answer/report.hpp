@@ -124,6 +124,7 @@ struct Report {
   std::optional<HeldOutScore> held_out;
   std::optional<Gain> gain;
   std::optional<Experiment> experiment;
+  std::string no_experiment;  // why there is none
   std::string no_model;       // why no board gets a set of this; empty: the two below are there
   std::string model_toml;     // the parameter set (--write-model)
   std::string baseline_toml;  // the two-resistor model as fitted, as a set (--write-baseline)

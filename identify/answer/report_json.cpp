@@ -126,6 +126,7 @@ std::string as_json(const Report& r) {
     out["experiment"] = {{"separates", r.experiment->separates}, {"profile", profile}, {"why", r.experiment->why}};
   }
   out["model_file"] = words(r.model_file);
+  out["no_experiment"] = words(r.no_experiment);
   out["no_model"] = words(r.no_model);
   out["reasoning"] = r.reasoning;
   // A path or a column's name need not be UTF-8.

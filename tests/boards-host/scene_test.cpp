@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "boards/host/optimum.hpp"
+#include "boards/host/stage.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
@@ -48,6 +49,14 @@ TEST(Scene, AKeyCanBeSetFromTheCommandLine) {
   EXPECT_DOUBLE_EQ(scene.shaft.angle_rad, 0.5);
   EXPECT_EQ(scene.seed, 7u);
   EXPECT_EQ(scene.motor, "ec-powermax-30-24v");
+}
+
+TEST(Scene, InAHotterRoomTheBoardIsHotterToo) {
+  const auto board_degC = [](const std::string& ambient) {
+    return boards::host::bench_of(read_scene("stall", folder, {"ambient_degC=" + ambient}), {}).board_ambient_degC;
+  };
+  EXPECT_EQ(board_degC("25"), 40);
+  EXPECT_EQ(board_degC("60"), 75);
 }
 
 TEST(Scene, MistakesAreAnsweredWithTheNearestName) {

@@ -144,6 +144,7 @@ TEST(HeatExperiment, ABoardRunsTheModelThatHostSimRuns) {
       {"speed cooling", head + sink("speed") + copper + sensor},
       {"natural convection", head + sink("natural_convection") + copper + sensor},
       {"radiation", plain + "[[link]]\nfrom = 1\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.05\n"},
+      {"neighbour", plain + "[[link]]\nfrom = 1\nto = \"neighbour\"\nlaw = \"constant\"\nconductance_W_per_K = 0.05\n"},
       {"further mass", head + "[[node]]\ncapacity_J_per_K = 60\n" + sink("constant") +
                            "[[link]]\nfrom = 1\nto = 2\nlaw = \"constant\"\nconductance_W_per_K = 0.2\n" + copper +
                            sensor},
@@ -197,6 +198,7 @@ TEST(HeatExperiment, ABoardRunsTheModelThatHostSimRuns) {
       in[thermal::Drive::enabled] = in[thermal::Drive::one] = 1;
       thermal::set_speed(in, w);
       in[thermal::Boundary::ambient] = 25;
+      in[thermal::Boundary::neighbour] = 60;
       at = a.step(steps_a, at, in);
       bt = b.step(steps_b, bt, in);
       apart_K = std::max(apart_K, (at - bt).cwiseAbs().maxCoeff());

@@ -14,6 +14,8 @@
 #include "console/link/board.hpp"
 #include "console/link/messages.hpp"
 #include "console/link/usb.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 std::atomic<int> ours{0}, of_libusb{0};
@@ -41,7 +43,8 @@ extern "C" [[gnu::noinline]] void* calloc(std::size_t count, std::size_t bytes) 
   return __libc_calloc(count, bytes);
 }
 
-int main() {
+namespace {
+int count() {
   console::link::Usb usb;
   console::link::Board board(usb.open(""));
   const wire::Setpoints wish{3, {}, 0, {0, 0}, {0, 0}};
@@ -66,4 +69,11 @@ int main() {
   const int taken = ours - before;
   fmt::print("{} exchanges: {} blocks by operator new, {} by calloc of libusb\n", states, taken, of_libusb.load());
   return states == 500 && taken == 0 ? 0 : 1;
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Memory that the link takes after its start: umockdev-wrapper mocked_bus link_memory"};
+  wire::pc::use_help(app, "link_memory --help");
+  return wire::pc::run_program(app, argc, argv, count);
 }

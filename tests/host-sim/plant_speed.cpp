@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: MIT
 // Prints what the plant costs: CPU nanoseconds per axis and PWM period in both bridges, and per long log of heat alone.
 // A program, not a test: figures of a clock prove nothing in a test run. --json: one object a line.
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <ctime>
-#include <string_view>
 
 #include "host-sim/plant/thermal_bench.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
 double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const bool json = argc > 1 && std::string_view(argv[1]) == "--json";
+int measure(bool json) {
   for (const char* id : {"ec-16-40w", "ec-powermax-30-24v"}) {
     for (const bool switched : {false, true}) {
       host_sim::BenchDesign design = plant_tests::bench_design(plant_tests::sheet(id));
@@ -51,4 +50,15 @@ int main(int argc, char** argv) {
                      : "%-20s heat alone, 20 min at 20 Hz, logged at 10 Hz: %.1f ms\n",
                 id, (cpu_s() - start_s) / 20 * 1e3);
   }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"What the simulated plant costs, in CPU time"};
+  wire::pc::use_help(app, "plant_speed --help");
+  bool json = false;
+  app.add_flag("--json", json, "one object a line");
+  return wire::pc::run_program(app, argc, argv, [&] { return measure(json); });
 }

@@ -6,17 +6,18 @@
 //   build/host/bin/fit_speed [--json] [--short]    short: not the ten hours, which take a minute
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <CLI/CLI.hpp>
 #include <ctime>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "identify/fit/parallel.hpp"
 #include "identify/log/table.hpp"
 #include "identify/search/problem_of.hpp"
 #include "identify/search/search.hpp"
 #include "tests/identify/bench_log.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/motor_file.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -79,8 +80,14 @@ void measure(const char* what, double seconds, double rate_Hz, double core_every
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto said = [&](std::string_view word) { return std::find(argv + 1, argv + argc, word) != argv + argc; };
-  const bool json = said("--json");
-  measure("20 min at 10 Hz, housing and sparse winding", 1200, 10, 30, json);
-  if (!said("--short")) measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
+  CLI::App app{"How long identify's fits and its search take"};
+  wire::pc::use_help(app, "fit_speed --help");
+  bool json = false, brief = false;
+  app.add_flag("--json", json, "one object a line");
+  app.add_flag("--short", brief, "not the ten hours, which take a minute");
+  return wire::pc::run_program(app, argc, argv, [&] {
+    measure("20 min at 10 Hz, housing and sparse winding", 1200, 10, 30, json);
+    if (!brief) measure("10 h at 2 Hz, housing and sparse winding", 36000, 2, 30, json);
+    return 0;
+  });
 }

@@ -17,6 +17,8 @@
 #include "identify/discover.hpp"
 #include "tests/identify/chance.hpp"
 #include "wire/pc/files.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -94,32 +96,19 @@ Case played(RecordOptions options, bool clean, std::uint64_t seed, const std::st
   return c;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app{"What identify's model gains on the motor that was recorded, in host-sim"};
+struct Asked {
   int seeds = 10;
   std::uint64_t first = tests::rotating_seed();
   bool json = false, check = false, clean = false;
-  RecordOptions options{.motor_folder = root + "/boards/motors", .scene_folder = root + "/host-sim/scenes"};
-  app.add_option("--seeds", seeds, "motors")->capture_default_str();
-  app.add_option("--first", first, "first seed")->capture_default_str();
-  app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
-  app.add_option("--minutes", options.minutes, "of each log")->capture_default_str();
-  app.add_flag("--clean", clean, "nothing is hidden in the motors");
-  app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
-  app.add_flag(
-      "--check", check,
-      "end with an error when a motor is served worse than by two resistors, is named and too hot, or misnamed");
-  app.add_flag("--json", json, "the cases as JSON");
-  CLI11_PARSE(app, argc, argv);
+};
 
+int gain(const RecordOptions& options, const Asked& asked) {
   const std::string folder =
       (std::filesystem::temp_directory_path() / fmt::format("hotcore_gain_{}", getpid())).string();
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   int missed = 0, helped = 0, harmed = 0, too_hot = 0, misnamed = 0;
-  for (int s = 0; s < seeds; ++s) {
-    const Case c = played(options, clean, first + static_cast<std::uint64_t>(s), folder);
+  for (int s = 0; s < asked.seeds; ++s) {
+    const Case c = played(options, asked.clean, asked.first + static_cast<std::uint64_t>(s), folder);
     missed += !c.before.kept();
     helped += !c.before.kept() && c.after.kept();
     const bool hotter = c.after.overshoot_K > std::max(most_overshoot_K, c.before.overshoot_K);
@@ -136,11 +125,12 @@ int main(int argc, char** argv) {
     fmt::print(stderr,
                "{:>3}/{} seed {:<8} {:<22} overshoot {:5.1f} -> {:5.1f} K, burst {:5.3f} -> {:5.3f}{}  {} (R1 {:+.0f} "
                "+- {:.0f} %, C1 {:+.0f} +- {:.0f} %)\n",
-               s + 1, seeds, c.seed, c.truth, c.before.overshoot_K, c.after.overshoot_K, c.before.share, c.after.share,
-               c.after.kept() ? "" : " MISSED", c.answer, 100 * c.R1.off, 100 * c.R1.by, 100 * c.C1.off, 100 * c.C1.by);
+               s + 1, asked.seeds, c.seed, c.truth, c.before.overshoot_K, c.after.overshoot_K, c.before.share,
+               c.after.share, c.after.kept() ? "" : " MISSED", c.answer, 100 * c.R1.off, 100 * c.R1.by, 100 * c.C1.off,
+               100 * c.C1.by);
   }
   std::filesystem::remove_all(folder);
-  if (json)
+  if (asked.json)
     fmt::print("{}\n", nlohmann::ordered_json{{"missed_by_two_resistors", missed},
                                               {"helped", helped},
                                               {"harmed", harmed},
@@ -153,6 +143,30 @@ int main(int argc, char** argv) {
         "{} motors; two resistors, fitted, miss {} (overshoot above {:g} K or less than {:g} % of the burst); the "
         "model found puts {} of these right and spoils {} of the others; {} with a cause named pass the limit by more "
         "than {:g} K, {} are given a name that is not the truth\n",
-        seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed, too_hot, most_overshoot_K, misnamed);
-  return check && harmed + too_hot + misnamed > 0 ? 1 : 0;
+        asked.seeds, missed, most_overshoot_K, 100 * least_share, helped, harmed, too_hot, most_overshoot_K, misnamed);
+  return asked.check && harmed + too_hot + misnamed > 0 ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"What identify's model gains on the motor that was recorded, in host-sim"};
+  wire::pc::use_help(app, "gain --help");
+  Asked asked;
+  RecordOptions options{.motor_folder = root + "/boards/motors", .scene_folder = root + "/host-sim/scenes"};
+  app.add_option("--seeds", asked.seeds, "motors")->capture_default_str()->check(wire::pc::between(1, 1e6));
+  app.add_option("--first", asked.first, "first seed")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, wire::pc::most_seed));
+  app.add_option("--excitation", options.excitation, "duty, designed or step")->capture_default_str();
+  app.add_option("--minutes", options.minutes, "of each log")
+      ->capture_default_str()
+      ->check(wire::pc::between(0.1, 1440.0));
+  app.add_flag("--clean", asked.clean, "nothing is hidden in the motors");
+  app.add_flag("--thermocouple", options.thermocouple, "a winding temperature in every line of the log");
+  app.add_flag(
+      "--check", asked.check,
+      "end with an error when a motor is served worse than by two resistors, is named and too hot, or misnamed");
+  app.add_flag("--json", asked.json, "the cases as JSON");
+  return wire::pc::run_program(app, argc, argv, [&] { return gain(options, asked); });
 }

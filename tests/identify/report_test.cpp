@@ -42,6 +42,8 @@ TEST(Report, JsonHoldsTheFieldsOfTheContract) {
   EXPECT_EQ(j.at("format"), 1);
   for (const char* key : {"verdict", "sentence", "baseline", "causes", "held_out", "gain", "experiment", "model_file"})
     EXPECT_TRUE(j.contains(key)) << key;
+  EXPECT_TRUE(j["experiment"].is_null());
+  EXPECT_EQ(j.at("no_experiment"), "no causes tie");
   ASSERT_EQ(j.at("baseline").at("parameters").size(), 4u);
   for (const auto& p : j["baseline"]["parameters"]) {
     for (const char* key : {"name", "value", "unit", "std_error", "determined"}) EXPECT_TRUE(p.contains(key)) << key;

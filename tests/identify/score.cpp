@@ -19,6 +19,8 @@
 #include "tests/identify/chance.hpp"
 #include "tests/identify/score_case.hpp"
 #include "tests/identify/score_table.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
@@ -369,19 +371,25 @@ int score(const Arguments& a) {
 
 int main(int argc, char** argv) {
   CLI::App app{"Scores identify on logs with hidden effects"};
+  wire::pc::use_help(app, "score --help");
   Arguments a;
   bool list = false;
   app.add_option("row", a.keys, "rows of the table; none: all")->check([](const std::string& key) {
     for (const Row& row : rows()) {
       if (key == row.key) return std::string();
     }
-    return "there is no row '" + key + "'; see --list";
+    return "there is no row '" + key + "' in --list";
   });
   app.add_flag("--list", list, "the rows");
-  app.add_option("--seeds", a.seeds, "logs for each hidden thing")->capture_default_str();
+  app.add_option("--seeds", a.seeds, "logs for each hidden thing")
+      ->capture_default_str()
+      ->check(wire::pc::between(1, 1e6));
   app.add_option("--at-most", a.at_most,
-                 "logs of a row that hides something, drawn by the first seed and other in each row");
-  app.add_option("--first", a.first, "first seed")->capture_default_str();
+                 "logs of a row that hides something, drawn by the first seed and other in each row")
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--first", a.first, "first seed")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, wire::pc::most_seed));
   app.add_option("--only", a.only, "one cause");
   app.add_option("--remove", a.remove, "take a cause out of the table");
   app.add_option("--structure", a.structure, "how far the clean motor is from two nodes, 1 = host-sim's default")
@@ -403,10 +411,9 @@ int main(int argc, char** argv) {
   app.add_flag("--verbose", a.verbose, "one line a log");
   app.add_flag("--explain", a.explain, "with --verbose, identify's reasoning");
   app.add_flag("--json", a.json, "the table as JSON");
-  CLI11_PARSE(app, argc, argv);
-  if (list) {
+  return wire::pc::run_program(app, argc, argv, [&] {
+    if (!list) return score(a);
     for (const Row& row : rows()) fmt::print("{:<18} {}\n", row.key, row.title);
     return 0;
-  }
-  return score(a);
+  });
 }

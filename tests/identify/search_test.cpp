@@ -796,6 +796,14 @@ TEST(SlowModelFile, NoBoardGetsAModelThatGoesByASpeedWhoseUnitNobodyTold) {
   EXPECT_EQ(identify::discover(without.logs, without.log.sheet).no_model, "");
 }
 
+TEST(SlowModelFile, NoBoardGetsAModelThatGoesByAFrameThatNoBoardMeasures) {
+  const auto report = report_of({.duty = tests::Duty::designed, .seed = 770252, .effects = {"frame_conduction"}});
+  ASSERT_EQ(report.verdict, Verdict::explained);
+  EXPECT_EQ(report.causes.front().id, "frame_conduction");
+  says(report.no_model, "the temperature of the frame, which no board measures");
+  EXPECT_TRUE(report.model_toml.empty());
+}
+
 TEST(SlowSearch, WithoutASheetANameAsksForALargerLead) {
   const Hidden log = hidden({.duty = tests::Duty::designed, .seed = 770112, .effects = {"constant_heat"}});
   identify::Problem problem = identify::problem_of(log.logs, {});

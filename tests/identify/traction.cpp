@@ -17,20 +17,15 @@
 #include "identify/discover.hpp"
 #include "identify/log/median.hpp"
 #include "tests/identify/chance.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
-int main(int argc, char** argv) {
-  // The promise for a measured drive of this kind: rms of the winding where nothing was fitted.
-  constexpr double most_K = 4;
-  CLI::App app{"What identify foretells of traction motors of five masses"};
-  int seeds = 20, drives = 1;
-  std::uint64_t first = tests::rotating_seed();
-  bool json = false;
-  app.add_option("--seeds", seeds, "motors")->capture_default_str();
-  app.add_option("--drives", drives, "of each motor")->capture_default_str();
-  app.add_option("--first", first, "first seed")->capture_default_str();
-  app.add_flag("--json", json, "the drives as JSON");
-  CLI11_PARSE(app, argc, argv);
+namespace {
 
+// The promise for a measured drive of this kind: rms of the winding where nothing was fitted.
+constexpr double most_K = 4;
+
+int foretell(int seeds, int drives, std::uint64_t first, bool json) {
   identify::HoldOut held;
   held.fraction = 0.25;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -74,4 +69,22 @@ int main(int argc, char** argv) {
         "{:.0f} h, each of {:.1f} s on one core\n",
         seeds, answered, identify::median(after), worst(after), identify::median(before), worst(before), most_K, kept,
         kept_by_two, recorded_h, worked_s / recorded_h);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"What identify foretells of traction motors of five masses"};
+  wire::pc::use_help(app, "traction --help");
+  int seeds = 20, drives = 1;
+  std::uint64_t first = tests::rotating_seed();
+  bool json = false;
+  app.add_option("--seeds", seeds, "motors")->capture_default_str()->check(wire::pc::between(1, 1e6));
+  app.add_option("--drives", drives, "of each motor")->capture_default_str()->check(wire::pc::between(1, 1e3));
+  app.add_option("--first", first, "first seed")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, wire::pc::most_seed));
+  app.add_flag("--json", json, "the drives as JSON");
+  return wire::pc::run_program(app, argc, argv, [&] { return foretell(seeds, drives, first, json); });
 }

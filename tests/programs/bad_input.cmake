@@ -127,6 +127,25 @@ refuse(profile_without_advice 2 "no experiment in it" ${HOST_SIM} record profile
 refuse(no_board_at_all 2 "1 to 1000 boards" ${BIN}/many_boards none)
 refuse(free_shaft_repeated 2 "free shaft" ${HOST_SIM} record jump)
 
+refuse(unknown_command 2 "^runn: there is no such command, did you mean 'run'\\?" ${HOST_SIM} runn jump)
+refuse(command_like_no_other 2 "^foo: there is no such command; --help" ${HOST_SIM} foo)
+refuse(negative_seed 2 "-1 is not in 0 to" ${HOST_SIM} record duty --seed -1)
+refuse(no_such_folder_of_motors 2 "^ec-16-40w: there is no such motor in /nowhere; give a .toml file"
+       ${CMAKE_COMMAND} -E env HOTCORE_MOTORS=/nowhere ${IDENTIFY} fine.csv --motor ec-16-40w)
+refuse(no_such_port 2 "99999 is not in 0 to 65535" ${BIN}/virtual-board --port 99999)
+refuse(no_such_port_of_the_chip 2 "x is not in 0 to 65535" ${BIN}/virtual-chip --port x)
+refuse(no_scene 2 "scene is required" ${BIN}/chip)
+refuse(no_faults_at_all 2 "0 is not in 1 to" ${BIN}/faults --seeds 0)
+refuse(no_option_of_the_benchmark 2 "plant_speed --help" ${BIN}/plant_speed --jsn)
+if(EXISTS ${BIN}/score)  # not built with sanitizers, as these
+  refuse(no_such_row 2 "there is no row 'nope'" ${BIN}/score nope)
+  refuse(no_number_of_seeds 2 "x is not in 1 to" ${BIN}/score --seeds x)
+  refuse(no_motors_at_all 2 "0 is not in 1 to" ${BIN}/traction --seeds 0)
+  refuse(unknown_excitation_of_gain 2 "'foo'" ${BIN}/gain --excitation foo)
+  refuse(no_option_of_the_fits 2 "fit_speed --help" ${BIN}/fit_speed --jsn)
+  refuse(no_board_to_count_on 4 "No board is plugged in" ${BIN}/link_memory)
+endif()
+
 execute_process(COMMAND ${HOST_SIM} record step --minutes 0.1 --out ${SCRATCH}/plain OUTPUT_VARIABLE said)
 if(said MATCHES "hidden" OR NOT said MATCHES "Recorded")
   list(APPEND failures "a log with nothing hidden: ${said}")

@@ -67,6 +67,11 @@ answers("verdict;changes" ${hotcore} identify --minutes 1 --out i)
 answers("rule;install" ${BIN}/hotcore --json udev)
 answers("boards;lost" ${BIN}/many_boards 2 0.1 --json)
 answers("fit_ms" ${BIN}/fit_speed --json --short)
+answers("" ${BIN}/plant_speed --json)
+answers("" ${BIN}/faults --only F01 --json)
+answers("figures;all_rows" ${BIN}/score zero --seeds 1 --at-most 1 --quick --json)
+answers("helped;cases" ${BIN}/gain --first 605 --seeds 1 --minutes 4 --json)
+answers("answered;motors" ${BIN}/traction --first 1 --seeds 1 --json)
 # They serve until Ctrl-C, which comes once they have said where (a minute is far more than the slowest build takes).
 set(interrupted sh -c [=[
   rm -f served

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "tests/thermal/reference.hpp"
@@ -120,6 +121,47 @@ TEST(Board, BothAxesShareIt) {
     EXPECT_LE(board.used_ratio(), 1.02f);
   }
   EXPECT_NEAR(static_cast<double>(a), 6.0, 0.05) << "what the other does not use is free";
+}
+
+/// A stage that heats `times` as much as its model says, and a sensor as noisy as host-sim's.
+TEST(Board, ASensorAheadOfTheModelHoldsBackWithoutSteps) {
+  for (const double times : {1.0, 1.3, 2.0}) {
+    for (const float most_A : {20.0f, 80.0f}) {
+      const std::string what = std::to_string(times) + ", " + std::to_string(most_A);
+      thermal::BoardRating rating;
+      rating.continuous_A *= most_A / 20.0f;
+      thermal::BoardHeat board(rating);
+      thermal::GovernorSettings s;
+      s.max_A = most_A;
+      const double limit_A2 = static_cast<double>(rating.continuous_A * rating.continuous_A);
+      std::mt19937 random(7);
+      std::normal_distribution<float> noise_K(0.0f, 0.2f);
+      double stage_A2 = 0;
+      float A = most_A, least_A = most_A, steepest_A = 0;
+      for (int i = 0; i < 60000; ++i) {
+        stage_A2 += (times * static_cast<double>(A * A) - stage_A2) * thermal::estimator_dt_s / 159;
+        const float degC = static_cast<float>(50 + 50 * stage_A2 / limit_A2);
+        EXPECT_LT(degC, 101.0f) << what;
+        board.tick(static_cast<double>(A * A), 0, {degC + noise_K(random), true});
+        const float next_A = board.allowed_A(0, s);
+        steepest_A = std::max(steepest_A, A - next_A);
+        least_A = std::min(least_A, next_A);
+        A = next_A;
+      }
+      EXPECT_LE(steepest_A, 0.02f * most_A) << what;
+      EXPECT_GT(least_A, 0.85f * rating.continuous_A / std::sqrt(static_cast<float>(times))) << what;
+    }
+  }
+}
+
+TEST(Board, AReadingThatIsNoNumberIsNoReading) {
+  thermal::BoardHeat board({});
+  for (const float bad : {std::nanf(""), -std::numeric_limits<float>::infinity()}) {
+    board.tick(0, 0, {bad, true});
+    EXPECT_EQ(board.used_ratio(), 0.0f);
+  }
+  for (int i = 0; i < 500; ++i) board.tick(0, 0, {100.0f, true});
+  EXPECT_GE(board.used_ratio(), 0.99f) << "deaf ever after";
 }
 
 TEST(Board, WhatIsUnknownCountsAsHot) {

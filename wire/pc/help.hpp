@@ -77,10 +77,30 @@ inline std::string nearest_option(const CLI::App& app) {
   return "";
 }
 
+/// Of a mistake on the command line: "foo: there is no such command" and the nearest that there is, where none is said.
+inline std::string unknown_command(const CLI::App& app) {
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->parsed()) return "";
+    known.push_back(command->get_name());
+  }
+  for (const std::string& word : app.remaining()) {
+    if (known.empty() || word.rfind('-', 0) == 0) continue;
+    const std::string hint = did_you_mean(word, known);
+    return word + ": there is no such command" + (hint.empty() ? ";" : hint);
+  }
+  return "";
+}
+
+/// Of seeds and counts: below it each is a whole number of its own in what a check reads.
+inline constexpr double most_seed = 1e15;
+
 /// `call`: how the program's help is asked for.
 inline void use_help(CLI::App& app, const std::string& call) {
   app.formatter(std::make_shared<Help>());
   app.failure_message([call](const CLI::App* of, const CLI::Error& error) {
+    const std::string command = unknown_command(*of);
+    if (!command.empty()) return command + " " + call + " lists what there is.\n";
     const std::string hint = nearest_option(*of);
     return error.what() + (hint.empty() ? ";" : hint) + " " + call + " lists what there is.\n";
   });

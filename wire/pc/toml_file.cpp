@@ -28,6 +28,7 @@ std::string find_toml(const std::string& kind, const std::string& which, const s
   // What lies in the working folder may be anything.
   const std::vector<std::string> known = folder == "." ? std::vector<std::string>{} : toml_names(folder);
   const std::string named = known.empty() ? "" : fmt::format(", or one of: {}", fmt::join(known, ", "));
+  const std::string where = known.empty() && folder != "." ? " in " + folder : "";
   if (which.size() > 5 && which.substr(which.size() - 5) == ".toml") {
     if (fs::is_regular_file(which, none)) return which;
     refuse(fmt::format("{}: there is no such {} file; check the path.", which, kind));
@@ -40,7 +41,7 @@ std::string find_toml(const std::string& kind, const std::string& which, const s
     refuse(fmt::format("{}: this is no {} file, those end in .toml; give one{}.", which, kind, named));
   const std::string hint = did_you_mean(which, known);
   if (is_path || known.empty())
-    refuse(fmt::format("{}: there is no such {}; give a .toml file{}.", which, kind, named));
+    refuse(fmt::format("{}: there is no such {}{}; give a .toml file{}.", which, kind, where, named));
   refuse(
       fmt::format("Unknown {} '{}'{} There are: {}.", kind, which, hint.empty() ? "." : hint, fmt::join(known, ", ")));
 }

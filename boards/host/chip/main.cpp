@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "boards/host/chip/play.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 
 namespace {
@@ -67,6 +68,7 @@ int main(int argc, char** argv) {
       fmt::format("{}\nThe flash image of the H8-15D, executed instruction by instruction on a model of its chip.\n",
                   examples),
       "chip"};
+  wire::pc::use_help(app, "chip --help");
   std::string scene, elf = root + "/build/h8-15d/bin/h8-15d.elf", out = "out/chip";
   std::vector<std::string> overrides;
   bool json = false;

@@ -8,6 +8,7 @@
 #include "boards/host/chip/cable.hpp"
 #include "boards/host/chip/play.hpp"
 #include "boards/host/usbip/server.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 
 namespace {
@@ -37,12 +38,13 @@ int main(int argc, char** argv) {
       "4 the image has no USB, 6 the port is taken.\n"
       "The flash image of the H8-15D on a model of its chip, as a USB device that a kernel can attach.\n",
       "virtual-chip"};
+  wire::pc::use_help(app, "virtual-chip --help");
   std::string elf = root + "/build/h8-15d/bin/h8-15d.elf", scene = "jump";
   std::uint16_t port = boards::usb::usbip_port;
   bool json = false;
   app.add_option("--scene", scene, "motors, shafts and supply of this scene of host-sim")->capture_default_str();
   app.add_option("--image", elf, "the flash image")->capture_default_str();
-  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
+  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(wire::pc::between(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   try {
     return wire::pc::run_program(app, argc, argv, [&] { return run(scene, elf, port, json); });

@@ -11,6 +11,7 @@
 
 #include "boards/host/usbip/server.hpp"
 #include "boards/host/virtual/virtual_board.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/motor_file.hpp"
 #include "wire/pc/program.hpp"
 
@@ -86,6 +87,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 2 the command line or a file is wrong, 6 the port is taken.\n"
       "A board that isn't there, as a USB device that a kernel can attach.\n",
       "virtual-board"};
+  wire::pc::use_help(app, "virtual-board --help");
   std::string motor = "ec-16-40w", serial = "SIM0";
   std::uint16_t port = usb::usbip_port;
   bool chip = false, json = false;
@@ -95,7 +97,7 @@ int main(int argc, char** argv) {
     constexpr std::size_t most = sizeof wire::Hello::serial - 1;
     return s.size() <= most ? "" : fmt::format("{} characters; at most {} fit", s.size(), most);
   });
-  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(CLI::Range(0, 65535));
+  app.add_option("--port", port, "TCP port on loopback")->capture_default_str()->check(wire::pc::between(0, 65535));
   app.add_flag("--json", json, "say where it is served in one line of JSON");
   if (std::find(argv, argv + argc, std::string("--chip")) != argv + argc) return become_chip(argv);
   return wire::pc::run_program(app, argc, argv, [&] {
