@@ -118,7 +118,11 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
         play(cold_course(before), turning_rad_per_s);
         // At rest, as the log has to begin.
         play({{0, 2}}, 0);
-        winding.begin();
+        if (!winding.begin())
+          console.tell(
+              fmt::format("The winding cannot be read: {:.1f} and {:.1f} A did not flow, or --leads is too much; is "
+                          "the current limited?",
+                          probe_share * rated_A, larger_share * rated_A));
         play({course.front()}, 0);
         course.erase(course.begin());
       }

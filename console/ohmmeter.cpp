@@ -9,7 +9,7 @@ namespace {
 // A current loop of 50 Hz has come within 1e-4 after 0.03 s. Noise of 30 mA in the samples makes 2 % of a voltage of
 // 1 V at a row, and a tenth of that of 30.
 constexpr double settling_s = 0.04, averaged_s = 0.06, same_level_s = 0.2;
-constexpr float same = 0.01f;  // of a current that is asked for: what limits it shows
+constexpr float near = 0.01f;  // of a current that is asked for: what limits it shows
 
 }  // namespace
 
@@ -29,7 +29,7 @@ std::optional<Ohmmeter::Mean> Ohmmeter::averaged(const Row& row, float level_A) 
 }
 
 std::optional<Ohmmeter::Reading> Ohmmeter::take(const Row& row) {
-  const auto flows = [&](float A) { return std::fabs(row.permitted_A - A) < same * A; };
+  const auto flows = [&](float A) { return std::fabs(row.permitted_A - A) < near * A; };
   const bool larger = cold_ && flows(larger_A_);
   const std::optional<Mean> mean = averaged(row, flows(probe_A_) ? probe_A_ : larger ? larger_A_ : 0);
   if (!mean) return {};

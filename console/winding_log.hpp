@@ -31,10 +31,11 @@ class WindingLog {
                           session.signals(), axis);
   }
 
-  /// Ends what was read while all was cold; rows begin with that, being as cold.
-  void begin() {
+  /// Ends what was read while all was cold; rows begin with that, being as cold. False: nothing was, nor will be.
+  bool begin() {
     cold_ohm_ = ohmmeter_.cold();
     begun_ = true;
+    return !cold_ohm_.empty();
   }
 
   void take(double time_s, const std::vector<float>& row, LogFile& file) {

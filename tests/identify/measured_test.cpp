@@ -86,7 +86,7 @@ TEST(SlowTraction, ASlowWindingRecordedForHoursIsReadInLongBins) {
   EXPECT_NEAR(found.C1_J_per_K / of_rows.C1_J_per_K, 1, 0.01);
 }
 
-TEST(MeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
+TEST(SlowMeasuredData, OneStillAirModelMissesTheFanRunByTensOfKelvin) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: no measured data at ../shared/data";
   const Outcome r = run(data + "tass_run1.csv " + data + "tass_run3.csv --hold-out " + data +
                         "tass_run4_fan.csv --map " + maps + "tass.toml --json -");

@@ -458,7 +458,7 @@ TEST(Report, WithoutASheetTheOhmIsSaidToBeThreeQuartersOfTheTerminals) {
   says(said, "3/4 of the resistance between two terminals, 3/2 of a phase's");
 }
 
-TEST(Report, OfALogThatTellsNoRoomTheRoomIsARival) {
+TEST(SlowReport, OfALogThatTellsNoRoomTheRoomIsARival) {
   tests::BenchOptions options;
   options.seconds = 1800;
   options.start_degC = 40;
@@ -545,7 +545,7 @@ TEST(SlowReport, ALateSensorInTheWindingIsNamedAndTheMotorBehindItFound) {
   }
 }
 
-TEST(Report, ALoadThatAlternatesBetweenRowsIsNoCause) {
+TEST(SlowReport, ALoadThatAlternatesBetweenRowsIsNoCause) {
   tests::BenchOptions options;
   options.seconds = 1200;
   options.current_A = [](double t, std::mt19937_64&) {  // steps of 1.3 Hz, in spells of a minute
@@ -683,7 +683,7 @@ TEST(SlowReport, WhatIsMissedBesideCausesIsOfTheirNearestFitToo) {
   EXPECT_LT(report.extended_rmse.housing_K, 0.12);  // twice the noise
 }
 
-TEST(Report, ACurrentThatItsSensorCutsOffNamesNoCause) {
+TEST(SlowReport, ACurrentThatItsSensorCutsOffNamesNoCause) {
   tests::BenchOptions options;
   options.seconds = 1200;
   options.current_A = [](double t, std::mt19937_64& random) {

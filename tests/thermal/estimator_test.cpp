@@ -378,7 +378,7 @@ TEST(Estimator, ASensorThatComesOffACoolingMotorIsFound) {
 /// A reset comes into a load, and the sensor stands still from there on, or where it was never right. Neither is the
 /// jump to its first reading a movement that it would have to follow, nor is it believed without limit for ever because
 /// it might lag.
-TEST(Estimator, AStuckSensorIsFoundAsSoonAfterAResetInALoad) {
+TEST(SlowEstimator, AStuckSensorIsFoundAsSoonAfterAResetInALoad) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     for (const double loaded_s : {0.0, 30.0, 120.0, 480.0}) {
       for (const float off_K : {10.0f, 0.0f, -10.0f, -20.0f}) {
@@ -409,7 +409,7 @@ TEST(Estimator, AStuckSensorIsFoundAsSoonAfterAResetInALoad) {
   }
 }
 
-TEST(Estimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
+TEST(SlowEstimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     for (const double share : {0.55, 0.6}) {
       Bench b(reference::ec16(), with(trust), 25);
@@ -427,7 +427,7 @@ TEST(Estimator, ASensorThatComesOffByHalfLetsNoWindingPassItsLimit) {
   }
 }
 
-TEST(Estimator, ASensorThatLagsUntoldLetsNoWindingPassItsLimit) {
+TEST(SlowEstimator, ASensorThatLagsUntoldLetsNoWindingPassItsLimit) {
   struct Case {
     wire::Motor sheet;
     float most_A;
