@@ -31,7 +31,7 @@ on_bus(gone_while_backing_up 7 "unplugged when asked to describe parameter" "--u
 on_bus(gone_while_saving 7 "unplugged when asked to save" "--unplug-after 1" save)
 on_bus(gone_while_logging 7 "unplugged when asked to go on.*cut.csv holds the [0-9]+ rows until then" "--unplug-after-in 300" log --out cut.csv --seconds 5 --rate 1000)
 expect(identify_reads_what_was_kept 3 "cut.csv: no current and no power flows" ${IDENTIFY} cut.csv --motor ec-16-40w)
-on_bus(gone_while_capturing 7 "unplugged when asked to hand over the capture.*cut_c.csv holds the [0-9]+ rows until then" "--unplug-after-in 200" capture axis0.ia_A axis0.ib_A --out cut_c.csv)
+on_bus(gone_while_capturing 7 "unplugged when asked to hand over the capture.*cut_c.csv holds the [0-9]+ rows until then" "--unplug-after-in 185" capture axis0.ia_A axis0.ib_A --out cut_c.csv)
 foreach(file cut.csv cut_c.csv)
   file(READ ${SCRATCH}/${file} text)
   if(NOT text MATCHES "\n[-0-9.]+(,[-0-9.e]*)+\n$" OR EXISTS ${SCRATCH}/${file}.part)
