@@ -8,6 +8,7 @@
 
 #include "boards/host/optimum.hpp"
 #include "boards/host/stage.hpp"
+#include "wire/pc/motor_file.hpp"
 #include "wire/pc/user_error.hpp"
 
 namespace {
@@ -52,8 +53,9 @@ TEST(Scene, AKeyCanBeSetFromTheCommandLine) {
 }
 
 TEST(Scene, InAHotterRoomTheBoardIsHotterToo) {
-  const auto board_degC = [](const std::string& ambient) {
-    return boards::host::bench_of(read_scene("stall", folder, {"ambient_degC=" + ambient}), {}).board_ambient_degC;
+  const wire::Motor motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors").motor;
+  const auto board_degC = [&](const std::string& ambient) {
+    return boards::host::bench_of(read_scene("stall", folder, {"ambient_degC=" + ambient}), motor).board_ambient_degC;
   };
   EXPECT_EQ(board_degC("25"), 40);
   EXPECT_EQ(board_degC("60"), 75);

@@ -135,9 +135,9 @@ refuse(no_such_folder_of_motors 2 "^ec-16-40w: there is no such motor in /nowher
 refuse(no_such_port 2 "99999 is not in 0 to 65535" ${BIN}/virtual-board --port 99999)
 refuse(no_such_port_of_the_chip 2 "x is not in 0 to 65535" ${BIN}/virtual-chip --port x)
 refuse(no_scene 2 "scene is required" ${BIN}/chip)
-refuse(no_faults_at_all 2 "0 is not in 1 to" ${BIN}/faults --seeds 0)
 refuse(no_option_of_the_benchmark 2 "plant_speed --help" ${BIN}/plant_speed --jsn)
 if(EXISTS ${BIN}/score)  # not built with sanitizers, as these
+  refuse(no_faults_at_all 2 "0 is not in 1 to" ${BIN}/faults --seeds 0)
   refuse(no_such_row 2 "there is no row 'nope'" ${BIN}/score nope)
   refuse(no_number_of_seeds 2 "x is not in 1 to" ${BIN}/score --seeds x)
   refuse(no_motors_at_all 2 "0 is not in 1 to" ${BIN}/traction --seeds 0)
