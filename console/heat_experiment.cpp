@@ -33,8 +33,9 @@ void leave_out_cooler(Offer& offer, const Values& before) {
   constexpr struct {
     const char* name;
     float towards_cool;
-  } rules[] = {{"R2_K_per_W", -1},       {"C2_J_per_K", 1},         {"housing_offset_K", 1}, {"constant_heat_W", -1},
-               {"radiation_W_per_K", 1}, {"natural_convection", 1}, {"speed_cooling", 1},    {"third_mass_J_per_K", 1}};
+  } rules[] = {{"R2_K_per_W", -1},      {"C2_J_per_K", 1},         {"housing_offset_K", 1},
+               {"constant_heat_W", -1}, {"radiation_W_per_K", 1},  {"natural_convection", 1},
+               {"speed_cooling", 1},    {"third_mass_J_per_K", 1}, {"trust_cooling_share", -1}};
   std::vector<std::string> left_out;
   for (const auto& [name, towards_cool] : rules) {
     const auto found = offer.values.find(name);
@@ -69,6 +70,7 @@ double continuous_A(const Values& values) {
 
 std::vector<Piece> cold_course(const Values& values) {
   const double rated_A = continuous_A(values);
+  // Five time constants as the board believes them, which may be off by a few times.
   const double rest_s = std::clamp(5 * value_of(values, "R1_K_per_W") * value_of(values, "C1_J_per_K"), 3.0, 20.0);
   const auto look = [&](double share) {
     return Piece{static_cast<float>(share * rated_A), static_cast<float>(probe_s)};
@@ -146,9 +148,12 @@ constexpr struct {
 
 Values parameters_of_model(const std::string& path, const Values& before, std::string& why) {
   const toml::table file = wire::pc::parse_toml(path);
+  wire::pc::need_kind("heat model", path, file);
   const auto array = [&](const char* key) {
     const toml::array* list = file[key].as_array();
-    return list != nullptr ? *list : toml::array{};
+    if (list == nullptr || !list->is_homogeneous(toml::node_type::table))
+      refuse(fmt::format("{}: there is no [[{}]]; let identify --write-model write the file.", path, key));
+    return *list;
   };
   const auto number = [](const toml::node& node, const char* key) { return (*node.as_table())[key].value_or(0.0); };
   const auto text = [](const toml::node& node, const char* key) {
@@ -221,6 +226,9 @@ Values parameters_of_model(const std::string& path, const Values& before, std::s
                                   {"trust_cooling_share", "cooling"},
                                   {"trust_correlation", "correlation"}}) {
     if (const auto value = file["trust"][key].value<double>()) put(name, *value);
+  }
+  for (const char* way : {"R1_K_per_W", "R2_K_per_W"}) {
+    if (!found.contains(way)) return why = std::string("no ") + way, Values{};
   }
   for (auto at = found.begin(); at != found.end();) {
     if (!std::isfinite(at->second)) return why = "no finite " + at->first, Values{};

@@ -8,8 +8,9 @@ namespace {
 
 // A current loop of 50 Hz has come within 1e-4 after 0.03 s. Noise of 30 mA in the samples makes 2 % of a voltage of
 // 1 V at a row, and a tenth of that of 30.
-constexpr double settling_s = 0.04, averaged_s = 0.06, same_level_s = 0.2;
-constexpr float near = 0.01f;  // of a current that is asked for: what limits it shows
+constexpr double settling_s = 0.04, averaged_s = 0.06;
+constexpr double same_level_s = 0.2;  // a probe that comes later is another one
+constexpr float near = 0.01f;         // of a current that is asked for: what limits it shows
 
 }  // namespace
 

@@ -99,13 +99,16 @@ TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
     EXPECT_TRUE(console::parameters_of_model(file("model.toml", text), believed(), why).empty());
     EXPECT_NE(why.find(words), std::string::npos) << why;
   };
-  refused("[[node]]\ncapacity_J_per_K = 1\n", "further mass");
+  refused(two_resistors + "[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n", "hot spot");
   refused(two_resistors + "[[source]]\nnode = 1\ndrive = \"enabled\"\ngain = 0.1\n", "enabled");
   refused(two_resistors + "[[link]]\nfrom = 1\nto = \"frame\"\nlaw = \"constant\"\nconductance_W_per_K = 0.1\n",
           "frame");
   refused(two_resistors + "[[link]]\nfrom = 0\nto = \"ambient\"\nlaw = \"radiation\"\nconductance_W_per_K = 0.1\n",
           "radiation");
   refused(two_resistors + "[housing_sensor]\nnode = 0\n", "towards the winding");
+  refused(two_resistors.substr(0, two_resistors.find("[[link]]\nfrom = 1")) +
+              two_resistors.substr(two_resistors.find("[[source]]")),
+          "no R2_K_per_W");
   // Firmware of before.
   refused(two_resistors + "[housing_sensor]\ngain_error = 0.1\n",
           "sensor_gain_share, which its firmware does not know");
@@ -241,6 +244,16 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreOfferedWhereItWasReadAndTellsThem) {
   EXPECT_FLOAT_EQ(console::offer(read, gain, believed(), true).values.at("C1_J_per_K"), 1.7f);
   read["baseline"]["parameters"][0]["determined"] = false;
   EXPECT_FALSE(console::offer(read, model, believed(), true).values.contains("R1_K_per_W"));
+}
+
+TEST(HeatExperiment, TrustInTheCoolingIsOfferedWhereTheRoomIsTold) {
+  console::Values before = believed();
+  before["trust_cooling_share"] = 0.2f;
+  nlohmann::json read = answer(0.1, true);
+  read["baseline"]["rmse_K"]["core"] = 0.8;
+  const std::string sure = file("model.toml", two_resistors + "[trust]\ncooling = 0.01\n");
+  EXPECT_FLOAT_EQ(console::offer(read, sure, before, true).values.at("trust_cooling_share"), 0.05f);
+  EXPECT_FALSE(console::offer(read, sure, before, false).values.contains("trust_cooling_share"));
 }
 
 TEST(HeatExperiment, OfALogThatCannotTellNothingIsOffered) {

@@ -61,8 +61,12 @@ file(WRITE ${SCRATCH}/found.toml "format = 1
 [housing_sensor]\nnode = 1\n[trust]\npower = 0.03\ninner_resistance = 0.05\ncooling = 0.06\ncorrelation = -0.4\n")
 expect(model 0 "axis1.R2_K_per_W +16.3 -> 20.*axis1.third_mass_J_per_K +0 -> 80.*axis1.trust_power_share +0.2 -> 0.03.*In force and saved" ${sim} model found.toml --axis 1 --yes --save)
 expect(model_without_a_yes 0 "axis0.third_mass_path_K_per_W +1 -> 2.*Nothing was written; --yes" ${sim} model found.toml)
-file(WRITE ${SCRATCH}/spot.toml "format = 1\n[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n[[node]]\ncapacity_J_per_K = 20\n[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n[housing_sensor]\nnode = 1\n")
+file(READ ${SCRATCH}/found.toml found)
+file(WRITE ${SCRATCH}/spot.toml "${found}[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n")
 expect(model_that_is_too_much 3 "^spot.toml: it has a hot spot, .*cannot express; run it with host-sim" ${sim} model spot.toml)
+expect(motor_for_a_model 2 "this is a motor and no heat model" ${sim} model ${CMAKE_CURRENT_LIST_DIR}/../../boards/motors/ec-16-40w.toml)
+file(WRITE ${SCRATCH}/numbers.toml "format = 1\nnode = [1, 2]\nlink = []\nsource = []\n[housing_sensor]\nnode = 1\n")
+expect(model_of_numbers 2 "^numbers.toml: there is no ..node..; let identify" ${sim} model numbers.toml)
 expect(model_that_is_not_there 2 "^nowhere.toml" ${sim} model nowhere.toml)
 
 # An identify beside hotcore that ends as by Ctrl-C, which reaches both, and one that is killed.
