@@ -42,7 +42,9 @@ Json json_of(const wire::State& state, double time_s) {
                     {"core_degC", number(axis.core_degC)},
                     {"core_sigma_K", number(axis.core_sigma_K)},
                     {"housing_degC", number(axis.housing_degC)},
-                    {"allowance_A", number(axis.allowance_A)}});
+                    {"allowance_A", number(axis.allowance_A)},
+                    {"time_left_s", number(axis.time_left_s)},
+                    {"allowance_1s_A", number(axis.allowance_1s_A)}});
   }
   return {{"time_s", number(time_s)}, {"bus_V", number(state.bus_V)}, {"axes", axes}};
 }
@@ -59,9 +61,10 @@ std::string Live::table(const wire::State& state, double time_s) const {
     if ((mask_ >> a & 1) == 0) continue;
     const wire::AxisReport& axis = state.axis[a];
     const std::string core = fmt::format("{:.1f} +-{:.1f}", axis.core_degC, axis.core_sigma_K);
-    const char* holding = axis.fault != 0   ? wire::text_of(axis.fault).name
-                          : axis.limit != 0 ? wire::text_of(axis.limit).name
-                                            : "";
+    const std::string holding = axis.fault != 0                   ? wire::text_of(axis.fault).name
+                                : axis.limit != 0                 ? wire::text_of(axis.limit).name
+                                : std::isfinite(axis.time_left_s) ? fmt::format("{:.1f} s left", axis.time_left_s)
+                                                                  : "";
     text += fmt::format("{:8.2f} {:7.1f}  {:<5}{:<8}{:<8}{:>8.2f}{:>8.2f}{:>9.1f}{:>14}{:>9.1f}{:>11.2f}   {}\n",
                         time_s, state.bus_V, a, mode_text(axis.mode), wire::text_of(axis.control), axis.id_A, axis.iq_A,
                         axis.speed_rad_per_s, core, axis.housing_degC, axis.allowance_A, holding);

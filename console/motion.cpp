@@ -138,7 +138,8 @@ Json members_of(const wire::Outlook& outlook) {
 }
 
 std::string sentence_of(const wire::Outlook& outlook) {
-  if (outlook.feasible != 0) return fmt::format("the hottest winding would reach {:.1f} degC", outlook.peak_degC);
+  if (outlook.feasible != 0)
+    return fmt::format("the hottest winding would reach {:.1f} degC, doubt included", outlook.peak_degC);
   const std::string unlimited =
       std::isfinite(outlook.peak_degC)
           ? fmt::format(" (unlimited, the winding would reach {:.0f} degC)", outlook.peak_degC)
@@ -147,6 +148,21 @@ std::string sentence_of(const wire::Outlook& outlook) {
       "the limit is met after {:.2f} s and {:.0f} % of the ampere-seconds; from there on less "
       "is delivered{}",
       outlook.limits_after_s, 100 * outlook.share_before_limit, unlimited);
+}
+
+/// As the board looks at it: in amperes. Torque counts as the axis itself would count it.
+std::vector<wire::Segment> segments_of(Console& console, int axis, const std::vector<Piece>& course) {
+  std::vector<wire::Segment> segments;
+  const auto get = [&](const char* name) {
+    const std::string whole = fmt::format("axis{}.{}", axis, name);
+    const float value = console.session().get(console.session().parameters().named(whole)).front();
+    if (!std::isfinite(value)) refuse(fmt::format("{} is not set; set it, or ask in amperes.", whole));
+    return value;
+  };
+  const bool torque = course.front().mode == wire::ControlMode::torque;
+  const float Nm_per_A = torque ? 1.5f * get("pole_pairs") * get("flux_linkage_Wb") : 1.0f;
+  for (const Piece& piece : course) segments.push_back({piece.seconds, piece.level / Nm_per_A});
+  return segments;
 }
 
 /// The board looks at heat alone, and would say yes to what its axis never gives.
@@ -160,22 +176,34 @@ void need_within_limit(Console& console, int axis, const std::vector<wire::Segme
   }
 }
 
+/// How long to rest until the course fits, s, to a twentieth; +infinity where the board does not look that far.
+float wait_s(Console& console, int axis, const std::vector<wire::Segment>& segments, float whole_s, bool standing) {
+  const auto fits = [&](float rest_s) {
+    std::vector<wire::Segment> rested = {{rest_s, 0.0f}};
+    rested.insert(rested.end(), segments.begin(), segments.end());
+    return console.session().ask(axis, rested, standing).feasible != 0;
+  };
+  float little_s = 0, enough_s = 0.999f * (wire::longest_ask_s - whole_s);  // rounding makes no course too long
+  if (segments.size() == wire::max_segments || !(enough_s > 0) || !fits(enough_s)) return INFINITY;
+  while (enough_s - little_s > 0.05f * enough_s) {
+    const float middle_s = 0.5f * (little_s + enough_s);
+    (fits(middle_s) ? enough_s : little_s) = middle_s;
+  }
+  return enough_s;
+}
+
 /// Both ways that the phases may share the heat. The answer goes by a standing rotor, which heats one phase up to twice
 /// as much, unless the caller knows that it turns.
 void ask(Console& console, const std::string& axis, const std::string& course, bool turns) {
-  std::vector<wire::Segment> segments;
+  const std::vector<Piece> pieces = profile_in(course, wire::max_segments);
   float whole_s = 0;
-  for (const Piece& piece : profile_in(course, wire::max_segments)) {
-    if (piece.mode != wire::ControlMode::current)
-      refuse("The look-ahead takes amperes; write the course as \"20A 0.3s, 6A 5s\".");
-    segments.push_back({piece.seconds, piece.level});
-    whole_s += piece.seconds;
-  }
+  for (const Piece& piece : pieces) whole_s += piece.seconds;
   if (!(whole_s <= wire::longest_ask_s)) {
     refuse(fmt::format("The course lasts {:g} s; the board looks {:g} s ahead, shorten it.", whole_s,
                        wire::longest_ask_s));
   }
   const int index = axis == "1" ? 1 : 0;
+  const std::vector<wire::Segment> segments = segments_of(console, index, pieces);
   need_within_limit(console, index, segments);
   const wire::Outlook standing = console.session().ask(index, segments, true);
   const wire::Outlook turning = console.session().ask(index, segments, false);
@@ -187,7 +215,16 @@ void ask(Console& console, const std::string& axis, const std::string& course, b
   text += fmt::format("  standing, the hottest phase at any angle:  {}.\n", sentence_of(standing));
   text += fmt::format("  turning, all phases share the heat:        {}.\n", sentence_of(turning));
   const bool by_turning = turns || (stands && !goes);
+  const bool feasible = by_turning ? goes : stands;
+  const float rest_s = feasible ? 0 : wait_s(console, index, segments, whole_s, !by_turning);
+  if (rest_s > 0)
+    text += std::isfinite(rest_s) ? fmt::format("  After {:.2g} s of rest it fits.\n", rest_s)
+                                  : fmt::format(
+                                        "  It does not fit after any rest that the board can look beyond, {:g} s "
+                                        "with the course itself.\n",
+                                        wire::longest_ask_s);
   Json json = members_of(by_turning ? turning : standing);
+  json["wait_s"] = number(rest_s);
   json["assumed"] = by_turning ? "turning" : "standing";
   json["standing"] = members_of(standing);
   json["turning"] = members_of(turning);

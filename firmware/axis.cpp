@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <new>
 
 #include "thermal/validate.hpp"
 
@@ -43,6 +44,7 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
     : rating_(rating),
       core_(usable_or_nothing(setup.heat), setup.estimator),
       governor_(governor_settings(rating)),
+      endurance_(core_.network(), rating.peak_A),
       peak_A_(rating.peak_A),
       blind_A_(blind_share * rating.continuous_A),
       blind_cap_A_(rating.peak_A),
@@ -55,6 +57,7 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
 void Axis::configure(const AxisSetup& setup, HeatModel heat) {
   if (heat == HeatModel::changed && usable(setup.heat)) {  // without a model the old one goes on: it knows what is hot
     core_.replace(setup.heat, setup.estimator);
+    new (&endurance_) thermal::Endurance(core_.network(), peak_A_);  // in place: too large for the stack
     senses_housing_ = setup.senses_housing;
   }
   allowance_ = {0.0f, wire::Limit::thermal_late};
@@ -498,6 +501,8 @@ void Axis::publish() {
   state.unseen = unseen_;
   state.heating_A = static_cast<float>(wire::direct_per_amplitude * std::sqrt(input_[thermal::Drive::current_A2]));
   state.allowance_A = allowance_.current_A;
+  state.time_left_s = endurance_.seconds_left();
+  state.allowance_1s_A = endurance_.current_A();
   state.limit = state.fast.limit;
   state.estimate_flags = now.flags;
   state.fault = fault();

@@ -34,6 +34,7 @@
 #include "hal/board_port.hpp"
 #include "thermal/core_estimator.hpp"
 #include "thermal/governor.hpp"
+#include "thermal/look_ahead.hpp"
 #include "thermal/losses.hpp"
 #include "wire/codes.hpp"
 #include "wire/protocol.hpp"
@@ -70,12 +71,14 @@ struct FastView {
 struct AxisState {
   Mode mode = Mode::off;
   FastView fast{};
-  float core_degC[3]{};                   // estimated, of the first three nodes with a limit: the phase windings
-  float core_sigma_K = 0.0f;              // of the hottest, with what is doubted: core + k sigma is what is limited
-  float housing_degC = 0.0f;              // estimated
-  thermal::Unseen unseen{};               // of the last 10 ms: what their samples did not show
-  float heating_A = 0.0f;                 // direct, through two terminals: heats as the phases did, ripple included
-  float allowance_A = 0.0f;               // amplitude, the smallest of core, board and what blindness leaves
+  float core_degC[3]{};         // estimated, of the first three nodes with a limit: the phase windings
+  float core_sigma_K = 0.0f;    // of the hottest, with what is doubted: core + k sigma is what is limited
+  float housing_degC = 0.0f;    // estimated
+  thermal::Unseen unseen{};     // of the last 10 ms: what their samples did not show
+  float heating_A = 0.0f;       // direct, through two terminals: heats as the phases did, ripple included
+  float allowance_A = 0.0f;     // amplitude, the smallest of core, board and what blindness leaves
+  float time_left_s = 0.0f;     // that what flows may go on until the core's limit; +infinity beyond half a minute
+  float allowance_1s_A = 0.0f;  // amplitude that the core bears for the next second
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
   std::uint32_t estimate_flags = 0;       // thermal::EstimateFlag
   FaultRecord fault;
@@ -162,6 +165,9 @@ class Axis {
   SignalPlace signal(std::uint8_t id) const;
   bool offset_known() const { return offsets_.known(); }
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
+
+  /// Every 4 ms: a step of how long the load may go on. Changes nothing but what is said.
+  void look_ahead() { endurance_.go_on(core_, 1); }
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
@@ -253,6 +259,7 @@ class Axis {
   // Slow lane, in the order of the walk.
   thermal::CoreEstimator core_;
   thermal::Governor governor_;
+  thermal::Endurance endurance_;
   thermal::Unseen looked_{};  // sum over `looks_`, since the last slow tick
   int looks_ = 0;
   thermal::Unseen unseen_{};

@@ -47,6 +47,11 @@ class Driver {
   void watch() {
     for (Axis& axis : axes_) axis.watch();
   }
+  /// Every millisecond once all else is done: a step of one axis' look-ahead, every other time. Nothing else needs it.
+  void look_ahead() {
+    turn_ = (turn_ + 1) % (2 * axis_count);
+    if (turn_ % 2 == 0) axes_[turn_ / 2].look_ahead();
+  }
   const thermal::BoardHeat& board_heat() const { return board_heat_; }
 
  private:
@@ -54,6 +59,7 @@ class Driver {
   thermal::BoardHeat board_heat_;
   float board_A_[axis_count] = {-1.0f, -1.0f};  // what it leaves each axis; negative: nothing said yet
   Axis axes_[axis_count];
+  int turn_ = 0;
 };
 
 }  // namespace firmware

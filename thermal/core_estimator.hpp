@@ -11,6 +11,8 @@
 // heap; every call costs the same but for lost time. Not for an ISR.
 #pragma once
 
+#include <cmath>
+
 #include "thermal/housing_watch.hpp"
 #include "thermal/network.hpp"
 #include "thermal/uncertainty.hpp"
@@ -100,6 +102,14 @@ class CoreEstimator {
   }
   /// How much faster T + k sigma rises than T when heat is poured in.
   float burst_margin() const { return 1.0f + settings_.margin_sigmas * settings_.trust.power; }
+  /// The same once a winding is as warm as its load makes it, or on the way there: whatever is more.
+  float load_margin() const {
+    return 1.0f + settings_.margin_sigmas * std::fmax(settings_.trust.power, settings_.trust.inner_resistance);
+  }
+  /// The node whose sensor corrects it; -1: no sensor is heard.
+  int heard_node() const {
+    return (estimate_.flags & (housing_missing | housing_contradicts)) != 0 ? -1 : housing_.node;
+  }
   const HeatNetwork<double>& network() const { return network_; }
   /// Of one step of 10 ms.
   const Transition<double>& transition() const { return transition_; }

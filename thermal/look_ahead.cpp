@@ -37,6 +37,7 @@ Walk begin_walk(const CoreEstimator& core, double rest_s) {
     walk.degC = core.network().step(core.network().transition(rest_s), walk.degC,
                                     future_input(core, 0.0f, {{0.0f, 0.0f, 0.0f}}));
   }
+  walk.began_degC = walk.degC;
   walk.forecast = {true, -infinity, infinity};
   float least_room_K = infinity;
   for (int i = 0; i < now.node_count; ++i) {
@@ -54,9 +55,11 @@ double step_walk(Walk& walk, const CoreEstimator& core, const Transition<double>
   const Estimate& now = core.estimate();
   const HeatNetwork<double>::Vector next = core.network().step(t, walk.degC, input);
   const double part = left_s < t.dt_s ? left_s / t.dt_s : 1.0;  // of the last step: a straight line within 10 ms
+  const Walk last = walk;
+  walk.degC += part * (next - walk.degC);
   for (int i = 0; i < now.node_count; ++i) {
     if (!std::isfinite(now.max_degC[i])) continue;
-    const double before = walk.degC[i], after = before + part * (next[i] - before),
+    const double before = last.margin_degC(i), after = walk.margin_degC(i),
                  limit = static_cast<double>(now.max_degC[i]);
     if (!(after <= static_cast<double>(walk.forecast.peak_degC))) walk.forecast.peak_degC = static_cast<float>(after);
     if (after <= limit) continue;
@@ -65,7 +68,6 @@ double step_walk(Walk& walk, const CoreEstimator& core, const Transition<double>
     if (!(at_s >= walk.forecast.limits_after_s)) walk.forecast.limits_after_s = at_s;
     walk.forecast.feasible = false;
   }
-  walk.degC += part * (next - walk.degC);
   walk.time_s += part * t.dt_s;
   return part * t.dt_s;
 }
@@ -74,7 +76,21 @@ bool usable(const Piece& piece) {
   return piece.seconds >= 0.0f && piece.seconds < 1e6f && std::abs(piece.current_A) < 1e4f;
 }
 
+/// Where a board's question begins.
+Walk begin_at(const CoreEstimator& core) {
+  Walk walk = begin_walk(core, 0.0);
+  walk.growth = static_cast<double>(core.load_margin() - 1.0f);
+  walk.heard_node = core.heard_node();
+  return walk;
+}
+
 }  // namespace
+
+double Walk::margin_degC(int node) const {
+  const double shared_K = heard_node < 0 ? 0.0 : degC[heard_node] - began_degC[heard_node];
+  const double rise_K = degC[node] - began_degC[node] - shared_K;
+  return rise_K > 0.0 ? degC[node] + growth * rise_K : degC[node];
+}
 
 LookAhead::LookAhead(const HeatNetwork<double>& network)
     : fine_(network.transition(0.01)), middle_(network.transition(0.1)), coarse_(network.transition(5.0)) {}
@@ -172,7 +188,7 @@ bool ProfileRun::begin(const CoreEstimator& core, const Piece* pieces, int count
   count_ = count;
   piece_ = 0;
   shares_ = shares;
-  walk_ = begin_walk(core, 0.0);
+  walk_ = begin_at(core);
   return true;
 }
 
@@ -189,6 +205,50 @@ bool ProfileRun::go_on(const CoreEstimator& core, int most_steps) {
     if (left_s <= core.transition().dt_s) ++piece_, done_s_ = 0.0;
   }
   return piece_ == count_;
+}
+
+Endurance::Endurance(const HeatNetwork<double>& network, float max_A)
+    : coarse_(network.transition(0.25)), max_A_(max_A) {}
+
+void Endurance::begin(const CoreEstimator& core) {
+  if (piece_.seconds == longest_s) {
+    for (int k = 0; k < 3; ++k) sum_[phase_drive(k)] /= slices_;
+    shares_ = phase_shares(sum_);
+    piece_.current_A = static_cast<float>(
+        std::sqrt((sum_[Drive::phase_a_A2] + sum_[Drive::phase_b_A2] + sum_[Drive::phase_c_A2]) / 1.5));
+    sum_ = {};
+    slices_ = 0;
+  }
+  walk_ = begin_at(core);
+  walking_ = true;
+}
+
+/// Takes the walk's answer and chooses what to ask next.
+void Endurance::answer() {
+  walking_ = false;
+  if (piece_.seconds == longest_s) {
+    seconds_left_ = walk_.forecast.limits_after_s;
+    piece_ = {ahead_s, max_A_};
+    good_A_ = 0.0f, bad_A_ = max_A_;
+    return;
+  }
+  (walk_.forecast.feasible ? good_A_ : bad_A_) = piece_.current_A;
+  piece_.current_A = 0.5f * (good_A_ + bad_A_);
+  if (bad_A_ - good_A_ > 0.01f * max_A_) return;
+  current_A_ = good_A_;
+  piece_ = {longest_s, 0.0f};
+}
+
+void Endurance::go_on(const CoreEstimator& core, int steps) {
+  for (int k = 0; k < 3; ++k) sum_[phase_drive(k)] += core.input()[phase_drive(k)];
+  ++slices_;
+  for (int step = 0; step < steps; ++step) {
+    if (!walking_) begin(core);
+    const double left_s = static_cast<double>(piece_.seconds) - walk_.time_s;
+    const Transition<double>& t = walk_.time_s < coarse_.dt_s ? core.transition() : coarse_;
+    if (walk_.forecast.feasible) step_walk(walk_, core, t, future_input(core, piece_.current_A, shares_), left_s);
+    if (left_s <= t.dt_s || !walk_.forecast.feasible) answer();
+  }
 }
 
 }  // namespace thermal

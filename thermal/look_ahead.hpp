@@ -6,9 +6,11 @@
 //   out  peak temperature of any node that has a limit, the moment it would be reached
 //
 // Steps of 10 ms in the first second of a piece, 0.1 s to 20 s, 5 s beyond; at most most_steps a run: every call is
-// bounded. On the board for the main loop (milliseconds at 168 MHz), not for a lane. Knows no slopes: it asks whether
-// the demand itself fits, not what the governor would make of it. A ProfileRun answers the first question alone, in
-// slices short enough to stand between two steps of a lane.
+// bounded. Knows no slopes: it asks whether the demand itself fits, not what the governor would make of it.
+//
+// A board asks otherwise, in slices short enough to stand between two steps of a lane, and lets the margin grow with a
+// winding's rise, as it will: a ProfileRun answers the first question, an Endurance the last, all the time. A LookAhead
+// compares models on a PC, and keeps the margin as it is.
 #pragma once
 
 #include "thermal/core_estimator.hpp"
@@ -30,9 +32,14 @@ struct Forecast {
 
 /// Temperatures on their way through a profile.
 struct Walk {
-  HeatNetwork<double>::Vector degC;
+  HeatNetwork<double>::Vector degC, began_degC;
+  double growth = 0.0;  // of the margin, with what a winding rises more than the housing that is heard
+  int heard_node = -1;
   double time_s = 0.0;
   Forecast forecast{};
+
+  /// What is limited.
+  double margin_degC(int node) const;
 };
 
 class LookAhead {
@@ -85,6 +92,40 @@ class ProfileRun {
   int count_ = 0, piece_ = 0;
   double done_s_ = 0.0;  // of the present piece
   double asked_As_ = 0.0, before_As_ = 0.0;
+};
+
+/// What is always known: how long the load may go on, and what may flow for a second. An answer is as old as it took to
+/// find, at most 400 steps: of 10 ms for a quarter of a second, of that much beyond.
+class Endurance {
+ public:
+  static constexpr float longest_s = 30.0f;
+  static constexpr float ahead_s = 1.0f;
+
+  /// max_A: largest |i| that is asked about. Another network, another Endurance: until it has looked, nothing may flow.
+  Endurance(const HeatNetwork<double>& network, float max_A);
+
+  /// A slice, often and in equal intervals: the load is the mean square of what flows while an answer is worked out.
+  void go_on(const CoreEstimator& core, int steps);
+
+  /// Until a limit is passed, s; +infinity where that is not within longest_s.
+  float seconds_left() const { return seconds_left_; }
+  /// Largest |i| for ahead_s, A, to 1 % of max_A on the safe side. It lies on the phases as the load does.
+  float current_A() const { return current_A_; }
+
+ private:
+  void begin(const CoreEstimator& core);
+  void answer();
+
+  Transition<double> coarse_;
+  float max_A_;
+  HeatInput<> sum_{};  // of the phases' squares, over so many slices
+  int slices_ = 0;
+  PhaseShares shares_{};
+  Walk walk_;
+  Piece piece_{longest_s, 0.0f};        // asked about: first the load, then what may flow for ahead_s
+  float good_A_ = 0.0f, bad_A_ = 0.0f;  // that lies between them
+  bool walking_ = false;
+  float seconds_left_ = 0.0f, current_A_ = 0.0f;
 };
 
 }  // namespace thermal

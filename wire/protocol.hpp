@@ -24,7 +24,7 @@ namespace wire {
 static_assert(std::endian::native == std::endian::little, "messages are memory images");
 
 /// Rises when a PC that knows only the older one would misread the board, or the other way round.
-inline constexpr std::uint16_t protocol_version = 2;  // 2: control modes
+inline constexpr std::uint16_t protocol_version = 3;  // 2: control modes; 3: time left
 
 /// pid.codes' test id: a placeholder, to be replaced before anything is sold. https://pid.codes/1209/0001/
 inline constexpr std::uint16_t usb_vendor_id = 0x1209, usb_product_id = 0x0001;
@@ -214,6 +214,8 @@ struct AxisReport {
   float housing_degC;            // estimated
   float allowance_A;             // largest |i| that is allowed now
   std::uint32_t estimate_flags;  // thermal::EstimateFlag
+  float time_left_s;             // that the load may go on until the core's limit; +infinity beyond half a minute
+  float allowance_1s_A;          // largest |i| that the core bears for the next second
 };
 
 struct State {
@@ -312,13 +314,14 @@ HOTCORE_AT(ParameterText, axes, 6);
 HOTCORE_AT(ParameterText, min, 8);
 HOTCORE_SIZE(SignalText, 8);
 HOTCORE_AT(SignalText, axes, 5);
-HOTCORE_SIZE(AxisReport, 44);
+HOTCORE_SIZE(AxisReport, 52);
 HOTCORE_AT(AxisReport, control, 4);
 HOTCORE_AT(AxisReport, id_A, 8);
 HOTCORE_AT(AxisReport, speed_rad_per_s, 16);
 HOTCORE_AT(AxisReport, core_degC, 24);
 HOTCORE_AT(AxisReport, allowance_A, 36);
-HOTCORE_SIZE(State, 100);
+HOTCORE_AT(AxisReport, time_left_s, 44);
+HOTCORE_SIZE(State, 116);
 HOTCORE_AT(State, period, 4);
 HOTCORE_AT(State, axis, 12);
 HOTCORE_SIZE(FaultEvidence, 20);

@@ -199,6 +199,8 @@ void Application::every_ms(std::uint32_t ms) {
   if (ms - slow_ms_ >= 10) {
     slow_ms_ = ms;
     slow_lane();
+  } else {
+    driver_.look_ahead();
   }
   // Fed only if everybody has moved on: both fast lanes since the last time, the slow lane within its time.
   const std::uint32_t fast[2] = {fast_ticks_[0].load(std::memory_order_relaxed),

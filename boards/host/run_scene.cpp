@@ -281,6 +281,7 @@ std::vector<Trace> Board::play(const std::function<void(double)>& progress) {
     period();
     if (periods_ % setpoint_periods == 0) driver_.watch();
     if (periods_ % slow_periods == 0) slow_tick();
+    if (periods_ % setpoint_periods == 0) driver_.look_ahead();
     if (periods_ <= warm_up) continue;
 
     for (std::size_t i = 0; i < traces.size(); ++i) {

@@ -283,6 +283,8 @@ wire::State Commands::state() const {
     report.housing_degC = slow.housing_degC;
     report.allowance_A = slow.allowance_A;
     report.estimate_flags = slow.estimate_flags;
+    report.time_left_s = slow.time_left_s;
+    report.allowance_1s_A = slow.allowance_1s_A;
   }
   return now;
 }

@@ -74,12 +74,13 @@ TEST(Figures, ReachesTheThermalLimitAndHoldsIt) {
 //   duties, as modulation depth: 0.02: 0.2 A in 0.7 ohm hot are 0.3 % of the bus, the sampling instant of a ramping
 //   speed (1 ms of 12000 rad/s2) 0.1 %, and 20 rad/s of speed where the pushes differ another 0.3 %
 //   while the governor acts: 0.6 A (it moves 0.4 A in the 10 ms by which the slow lanes may differ)
-//   estimated and true core: 4 K and 3 K where 20 A heat it by 0.3 K a millisecond and the estimate is 10 ms old at
-//   worst; 16 A make that 2.6 and 2 K; the gait's 8 A at most 0.7 K, and 1 K is given to each; impulse: 1 %
+//   true core: 3 K where 20 A heat it by 0.3 K a millisecond; 16 A make that 2 K; the gait's 8 A at most 0.7 K, 1 K is
+//   given; the estimate the same, beside the host's of the 11 ms before or after: both are up to 10 ms old, the image's
+//   one more while it computes; impulse: 1 %
 struct Excerpt {
   const char* scene;
   std::vector<std::string> overrides;
-  double estimated_core_K, true_core_K;
+  double core_K;
   friend void PrintTo(const Excerpt& excerpt, std::ostream* out) { *out << excerpt.scene; }  // else ctest lists bytes
 };
 
@@ -112,7 +113,11 @@ TEST_P(Agreement, OfTheImageWithTheHostBuildOnTheSameScene) {
         host_depth += b.rows[k].depth_ratio / window;
       }
       const auto &x = a.rows[i + window - 1], &y = b.rows[i + window - 1];
-      estimated_K = std::max(estimated_K, std::abs(x.estimated_core_degC - y.estimated_core_degC));
+      const std::size_t at = i + window - 1, age = 11;
+      double apart_K = 1e9;
+      for (std::size_t k = at - age; k <= std::min(at + age, b.rows.size() - 1); ++k)
+        apart_K = std::min(apart_K, std::abs(x.estimated_core_degC - b.rows[k].estimated_core_degC));
+      estimated_K = std::max(estimated_K, apart_K);
       true_K = std::max(true_K, std::abs(x.true_core_degC - y.true_core_degC));
       if (!steady || std::abs(b.rows[i].demand_A) < 0.5) continue;  // of nothing the host logs the ripple
       ++compared;
@@ -131,17 +136,17 @@ TEST_P(Agreement, OfTheImageWithTheHostBuildOnTheSameScene) {
     EXPECT_LT(free_A, 0.2);
     EXPECT_LT(limited_A, 0.6);
     EXPECT_LT(depth, 0.02);
-    EXPECT_LT(estimated_K, excerpt.estimated_core_K);
-    EXPECT_LT(true_K, excerpt.true_core_K);
+    EXPECT_LT(estimated_K, excerpt.core_K);
+    EXPECT_LT(true_K, excerpt.core_K);
     EXPECT_LT(std::abs(a.impulse_As - b.impulse_As), 0.01 * b.impulse_As);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Figures, Agreement,
-                         testing::Values(Excerpt{"jump", {"seconds=1.2"}, 4, 3},
-                                         Excerpt{"stall", {"seconds=1.4", "log_Hz=1000"}, 4, 3},
-                                         Excerpt{"get-up", {"seconds=1.2", "log_Hz=1000"}, 2.6, 2},
-                                         Excerpt{"walk-loaded", {"seconds=2.0", "log_Hz=1000"}, 1, 1}),
+                         testing::Values(Excerpt{"jump", {"seconds=1.2"}, 3},
+                                         Excerpt{"stall", {"seconds=1.4", "log_Hz=1000"}, 3},
+                                         Excerpt{"get-up", {"seconds=1.2", "log_Hz=1000"}, 2},
+                                         Excerpt{"walk-loaded", {"seconds=2.0", "log_Hz=1000"}, 1}),
                          [](const auto& excerpt) {
                            std::string name = excerpt.param.scene;
                            std::replace(name.begin(), name.end(), '-', '_');

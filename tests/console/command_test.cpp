@@ -79,7 +79,7 @@ TEST_F(Commands, GetShowsValueRangeAndMeaning) {
   EXPECT_NE(said.out.find("20   0 to 100"), std::string::npos) << said.out;
   EXPECT_EQ(json("get current_limit_A").size(), 2u);  // both axes
   EXPECT_EQ(json("get p*").size(), 4u);
-  EXPECT_EQ(json("get").size(), 7u);  // three for each axis, one for the board
+  EXPECT_EQ(json("get").size(), 9u);  // four for each axis, one for the board
   EXPECT_EQ(json("get fan_delay_s")["fan_delay_s"]["unit"], "s");
 }
 
@@ -207,7 +207,6 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   refused("mode current", 8, "refused to put both axes in current mode: axis 0: the axis is armed");
   refused("mode voltage", 2, "MODE");
   refused("run \"1A 1s, 1Nm 1s\"", 2, "has another unit than the pieces before it");
-  refused("ask \"1Nm 1s\"", 2, "takes amperes");
   refused("arm --iq 1 --torque 1", 2, "excludes");
 }
 
@@ -272,7 +271,8 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
             "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of the "
             "ampere-seconds; from there on "
             "less is delivered (unlimited, the winding would reach 171 degC).\n"
-            "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC.\n");
+            "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC, doubt included.\n"
+            "  It does not fit after any rest that the board can look beyond, 60 s with the course itself.\n");
   const auto outlook = json("ask \"20A 0.3s\"");
   EXPECT_EQ(outlook["assumed"], "standing");
   EXPECT_FALSE(outlook["standing"]["feasible"]);
@@ -283,6 +283,28 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
   EXPECT_FALSE(json("ask \"20A 0.3s\"")["feasible"]);
   board_->standing = board_->turning;
   EXPECT_EQ(say("ask \"20A 0.3s\" --turning").out.find("Not in full, standing or turning."), 0u);
+}
+
+TEST_F(Commands, AskSaysHowLongToRest) {
+  board_->enough_rest_s = 12;
+  EXPECT_NEAR(json("ask \"20A 0.3s\"")["wait_s"].get<double>(), 12.3, 0.3);
+  EXPECT_NE(say("ask \"20A 0.3s\"").out.find("  After 12 s of rest it fits.\n"), std::string::npos);
+  EXPECT_EQ(json("ask \"20A 0.3s\" --turning")["wait_s"], 0.0) << "it fits at once";
+  board_->enough_rest_s = 0.2f;
+  EXPECT_NEAR(json("ask \"20A 0.3s\"")["wait_s"].get<double>(), 0.205, 0.006);
+  board_->enough_rest_s = 50;
+  EXPECT_TRUE(json("ask \"20A 11s\"")["wait_s"].is_null()) << "the board does not look that far";
+}
+
+TEST_F(Commands, AskCountsTorqueAsTheAxisWould) {
+  board_->standing = board_->turning;
+  ASSERT_EQ(say("set axis1.pole_pairs=7 axis1.flux_linkage_Wb=0.002").code, 0);
+  ASSERT_EQ(say("ask \"210mNm 0.3s, -0.021Nm 1s\" --axis 1").code, 0);
+  ASSERT_EQ(board_->course.size(), 2u);
+  EXPECT_NEAR(board_->course[0].current_A, 10, 1e-3);
+  EXPECT_NEAR(board_->course[1].current_A, -1, 1e-4);
+  ASSERT_EQ(say("set axis1.current_limit_A=9").code, 0);
+  refused("ask \"210mNm 0.3s\" --axis 1", 2, "10 A is more than the axis ever gives, axis1.current_limit_A is 9");
 }
 
 TEST_F(Commands, AskSaysNoYesToWhatTheAxisNeverGives) {

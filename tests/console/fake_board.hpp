@@ -32,6 +32,7 @@ struct FakeBoard {
 
   std::vector<Parameter> parameters = {
       {0x0101, "phase_resistance", "ohm", "of one phase", 1e-3f, 50.0f, std::nanf(""), wire::needs_disarmed},
+      {0x0104, "flux_linkage", "Wb", "peak, of one phase", 1e-5f, 1.0f, 0.01f, wire::needs_disarmed},
       {0x0105, "pole_pairs", "count", "whole number", 1.0f, 50.0f, 1.0f, wire::whole_number},
       {0x0111, "current_limit", "A", "amplitude", 0.0f, 100.0f, 20.0f},
       {0x0201, "fan_delay", "s", "of the whole board", 0.0f, 60.0f, 5.0f, 0, 1}};
@@ -51,6 +52,8 @@ struct FakeBoard {
   std::uint8_t axis1_limit = 0;
   wire::FaultEvidence evidence{};
   wire::Outlook standing{{}, 0, {}, 171.0f, 0.21f, 0.8f}, turning{{}, 1, {}, 98.0f, INFINITY, 1.0f};
+  float enough_rest_s = INFINITY;     // before a course, for any
+  std::vector<wire::Segment> course;  // last
   /// Sees each request before it is answered; false: no answer comes.
   std::function<bool(wire::Kind)> before = [](wire::Kind) { return true; };
   /// May change an answer's payload before it is framed.
@@ -264,7 +267,11 @@ struct FakeBoard {
         add(payload, wire::Offsets{{}, {0.01f, -0.02f, 0.03f}});
         break;
       case wire::Kind::ask:
-        add(payload, frame.payload[1] != 0 ? standing : turning);
+        course = list<wire::Segment>(frame, sizeof(wire::Ask));
+        add(payload, course.front().current_A == 0 && course.front().seconds >= enough_rest_s
+                         ? wire::Outlook{{}, 1, {}, 98.0f, INFINITY, 1.0f}
+                     : frame.payload[1] != 0 ? standing
+                                             : turning);
         break;
       case wire::Kind::subscribe:
         watched_ = list<wire::SignalAddress>(frame, sizeof(wire::Subscribe));

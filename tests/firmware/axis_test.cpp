@@ -71,6 +71,7 @@ struct Rig {
       if (ticks % 20 == 0) driver.watch();
       if (ticks % 200 == 0 && slow_lane_alive)
         driver.slow_tick({{stage_degC, true}, 0.0f, false}, {{{housing_degC, housing_ok}}, {{25.0f, true}}});
+      if (ticks % 20 == 0) driver.look_ahead();
     }
   }
   void tick(const hal::AxisSample& sample) {
@@ -659,6 +660,33 @@ std::vector<hal::Duty> first_axis_beside(bool busy_neighbour) {
   EXPECT_EQ(driver.axis(0).mode(), Mode::running);
   EXPECT_EQ(driver.axis(1).mode(), busy_neighbour ? Mode::tripped : Mode::off);
   return duties;
+}
+
+TEST(Axis, HowLongTheLoadMayGoOnIsSaidBeforeItsLimitComes) {
+  wire::Motor sheet = bench::motor();
+  sheet.R1_K_per_W = 2.0, sheet.C1_J_per_K = 5.0;  // 20 A in 7 s
+  firmware::DriverSetup setup = bench::driver_setup();
+  setup.axes[0].heat = thermal::three_phase_set(sheet);
+  Rig rig(setup);
+  rig.bring_up();
+  rig.motor.rad_per_s = 50;
+  rig.hold({0.0f, 2.0f}, 40000);
+  EXPECT_EQ(rig.axis().state().time_left_s, bench::inf);
+  EXPECT_EQ(rig.axis().state().allowance_1s_A, bench::rating.peak_A);
+  rig.hold({0.0f, 20.0f}, 30000);
+  const float told_s = rig.axis().state().time_left_s;
+  ASSERT_GT(told_s, 1.5f);
+  float went_s = 0.0f;
+  for (; rig.axis().state().limit != Limit::core_hot && went_s < 30.0f; went_s += 0.01f) {
+    rig.hold({0.0f, 20.0f}, 200);
+    if (rig.axis().state().time_left_s < 0.5f) {
+      EXPECT_LT(rig.axis().state().allowance_1s_A, 20.0f);
+    }
+  }
+  constexpr float answer_s = 0.8f, braking_s = 0.6f;  // as old as what is told may be; from peak to holding current
+  EXPECT_LT(went_s, told_s);
+  EXPECT_GT(went_s, told_s - answer_s - braking_s);
+  std::printf("told %.2f s, held back after %.2f s\n", static_cast<double>(told_s), static_cast<double>(went_s));
 }
 
 TEST(Driver, AnAxisDoesNotFeelTheOtherOneMoveOrTrip) {

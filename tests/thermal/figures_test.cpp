@@ -21,6 +21,7 @@ using thermal::Drive;
 using thermal::HeatInput;
 using thermal::Reading;
 
+constexpr float endless = std::numeric_limits<float>::infinity();
 const double times_s[] = {0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000, 3000};
 
 /// Reference values: closed form of the two-node motor by an independent program, ambient 25, limit 155 degC.
@@ -272,6 +273,45 @@ TEST(LookAhead, SecondsLeftAgreesWithTheReference) {
     const float rated_A = static_cast<float>(thermal::rated_current_A(m, 25));
     EXPECT_EQ(look.seconds_left(core, 0.9f * rated_A, rotating), std::numeric_limits<float>::infinity());
   }
+}
+
+TEST(Endurance, PublishesWhatALookAheadWouldHaveAnsweredAMomentAgo) {
+  for (const wire::Motor& m : {reference::ec16(), reference::powermax()}) {
+    for (double t_s : {5.0, 10.0, 25.0, 300.0}) {
+      SCOPED_TRACE(t_s);
+      const float A = static_cast<float>(thermal::current_to_limit_A(m, t_s, 25)), max_A = 4 * A;
+      auto core = soaked(m, 25), before = core;
+      thermal::Endurance endurance(core.network(), max_A);
+      HeatInput<> load;
+      for (int k = 0; k < 3; ++k) load[thermal::phase_drive(k)] = 0.5 * static_cast<double>(A * A);
+      for (int ms = 0; ms < 3200; ++ms) {
+        if (ms % 10 == 0) core.tick(load, {}, {25.0f, true});
+        if (ms == 1600) before = core;
+        if (ms % 4 == 0) endurance.go_on(core, 1);
+      }
+      const thermal::LookAhead look(core.network());
+      const float most_s = look.seconds_left(before, A, rotating), least_s = look.seconds_left(core, A, rotating);
+      EXPECT_LE(endurance.seconds_left(), most_s > 30 ? endless : 1.01f * most_s);
+      EXPECT_GE(endurance.seconds_left(), least_s > 30 ? endless : 0.99f * least_s);
+      EXPECT_LE(endurance.current_A(), look.current_for_A(before, 1, max_A, rotating));
+      EXPECT_GE(endurance.current_A(), look.current_for_A(core, 1, max_A, rotating) - 0.02f * max_A);
+    }
+  }
+}
+
+TEST(Endurance, NothingMayFlowUntilItHasLookedNorWhereTheEstimateIsBroken) {
+  const auto core = soaked(reference::ec16(), 25);
+  thermal::Endurance endurance(core.network(), 20);
+  EXPECT_EQ(endurance.current_A(), 0.0f);
+  EXPECT_EQ(endurance.seconds_left(), 0.0f);
+  auto hot = core;
+  hot.start_hot();
+  hot.raise_to(200);
+  for (int ms = 0; ms < 1000; ++ms) endurance.go_on(core, 2);
+  EXPECT_GT(endurance.current_A(), 5.0f);
+  for (int ms = 0; ms < 1000; ++ms) endurance.go_on(hot, 2);
+  EXPECT_EQ(endurance.current_A(), 0.0f);
+  EXPECT_EQ(endurance.seconds_left(), 0.0f);
 }
 
 TEST(LookAhead, BeginsAtTheMarginNotAtTheEstimate) {
