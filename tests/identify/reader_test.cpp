@@ -376,6 +376,23 @@ TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   says(log.notes[0], "housing_degC stood frozen at one value in 1 stretch (40 rows");
 }
 
+TEST(Reader, ALoadThatStandsStillAmongNoiseIsSaid) {
+  const auto notes = [](bool measured, double stands_A) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> noise(0, 0.02);
+    std::string text = head;
+    for (int i = 0; i < 900; ++i) {
+      const bool stands = i >= 300 && i < 500;
+      const double load_A = measured && !stands ? 3 + noise(random) : stands ? stands_A : i < 300 ? 3 : 1;
+      text += fmt::format("{},{:.3f},{:.2f}\n", 0.1 * i, load_A, 22 + 0.01 * i + noise(random));
+    }
+    return fmt::format("{}", fmt::join(read(text)[0].notes, " "));
+  };
+  says(notes(true, 3.1), "current_A stands at one value for 20 s from 30 s");
+  EXPECT_EQ(notes(true, 0).find("stands"), std::string::npos) << "switched off";
+  EXPECT_EQ(notes(false, 3.1).find("stands"), std::string::npos) << "commanded";
+}
+
 TEST(Reader, AUnitInBracketsThatIsNotKnownIsSaidNotToBeUsed) {
   const auto speed = [](const std::string& column) {
     ColumnMap map;
