@@ -44,6 +44,26 @@ double narrowing(Eigen::MatrixXd H, const std::vector<Coordinate>& c, const std:
   return H.ldlt().vectorD().array().abs().log().sum();
 }
 
+/// The same of where a late sensor stands after each pause: read, instead of fitted, and to be paid for alike, or each
+/// pause would be a free bend of the course.
+double narrowing_by_reading(const Problem& problem, const Fit& f, const std::vector<Coordinate>& c) {
+  const int lag = coordinate_of(f, Edit::sensor_lag);
+  if (lag < 0) return 0;
+  const double lag_s = f.x[lag] + least_lag_s,
+               read_sd_K =
+                   std::hypot(problem.noise.housing_white_K / std::sqrt(first_readings), problem.noise.housing_slow_K);
+  double out = 0;
+  for (std::size_t l = 0; l < problem.logs.size(); ++l) {
+    const std::vector<Start>& starts = problem.logs[l].starts;
+    for (std::size_t s = 1; s < starts.size(); ++s) {
+      const auto housing = static_cast<std::size_t>(own_at(problem, f.x, l)) + s * per_start_count;
+      if (!std::isnan(starts[s].housing_degC))
+        out += 2 * still_late(lag_s) * std::log(std::max(1.0, c[housing].sd / read_sd_K));
+    }
+  }
+  return out;
+}
+
 /// The misfit with its priors near x, as a parabola; `held` are the coordinates that a bound holds there.
 struct Parabola {
   Eigen::VectorXd gradient;
@@ -153,6 +173,7 @@ Fit descend(const Problem& problem, const Averaged& averaged, const std::vector<
   // From phases that share their heat at once to phases that share none (problem.cpp).
   out.uneven_per_A2 = std::clamp(out.uneven_per_A2, -problem.uneven_per_A2, problem.uneven_per_A2);
   out.x = x;
+  out.narrowing += narrowing_by_reading(problem, out, c);
   out.information = here.curvature;
   out.from_data = now.information;
   out.gradient = here.gradient;

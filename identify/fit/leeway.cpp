@@ -94,8 +94,12 @@ Leeway lateness(const Run& prompt) {
   constexpr double lag_s = 0.2;  // short: it shows the slope
   const Physical p = physical(prompt.motor.x);
   const double late_s = ordinary_late_s + ordinary_late_share * p.R2_K_per_W * p.C2_J_per_K;
-  Leeway out =
-      moved(prompt, {prompt.problem, with_cause(prompt.motor, "sensor_lag", {lag_s})}, late_s / (lag_s + least_lag_s));
+  Problem unread = prompt.problem;  // what noise read behind a pause is no lateness
+  for (Bins& log : unread.logs) {
+    for (Start& start : log.starts) start.housing_degC = missing;
+  }
+  Leeway out = moved({unread, prompt.motor}, {unread, with_cause(prompt.motor, "sensor_lag", {lag_s})},
+                     late_s / (lag_s + least_lag_s));
   forget(out.core_K);
   return out;
 }

@@ -284,10 +284,8 @@ void add_inputs(Bins& out, const Log& log, double usual_s, const Inputs& in, dou
   }
 }
 
-/// What a housing's first readings are averaged over: five are noisy by less than half of one, and half a minute moves
-/// it little.
+/// What a housing's first readings are averaged over at most: half a minute moves it little.
 constexpr double first_s = 30;
-constexpr int first_readings = 5;
 
 double first_reading(const Bins& log, double Bin::*reading, std::size_t from, std::size_t to, int most,
                      double within_s = first_s) {

@@ -45,6 +45,8 @@ struct Bin {
   bool idle;  // nothing heats and nothing turns
 };
 
+inline constexpr int first_readings = 5;  // of a housing, averaged: noisy by less than half of one
+
 /// Where a log begins, and where it begins again after a pause in which nothing tells what heated.
 struct Start {
   std::size_t bin = 0;

@@ -50,25 +50,6 @@ void mask_frozen(Log& log, Role role) {
                   own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
 }
 
-/// A load is commanded as well, and a command stands: one that stands still among noise is only said.
-void note_standing_load(Log& log, Role role) {
-  const std::vector<double>& v = log.of(role);
-  const auto& t = log.of(Role::time);
-  std::size_t repeated = 0;
-  for (std::size_t i = 1; i < v.size(); ++i) repeated += v[i] == v[i - 1];
-  constexpr double long_s = 10, noisy_share = 0.1;
-  for (const auto& [from, to] : frozen_runs(v)) {
-    const double stood_s = t[to - 1] - t[from];
-    const std::size_t rows = to - from;
-    const double others = static_cast<double>(v.size() - rows);
-    if (v[from] == 0 || stood_s < long_s || static_cast<double>(repeated - (rows - 1)) > noisy_share * others) continue;
-    log.notes.push_back(fmt::format(
-        "{} stands at one value for {:.0f} s from {:.0f} s, and changes from row to row elsewhere; if it was not "
-        "measured there, leave those rows out.",
-        own_name(role), stood_s, t[from]));
-  }
-}
-
 /// Of each reading and those around it, within half a second and ten rows either way (half of hurry_s; more rows cost):
 /// noise that reaches over the next step now and then is no step.
 std::vector<double> medians_around(const std::vector<double>& v, double usual_s) {
@@ -448,9 +429,6 @@ void forget_glitches(Log& log) {
 void mask(Log& log) {
   for (const Role role : temperatures) {
     if (log.has(role)) mask_frozen(log, role);
-  }
-  for (const Role role : {Role::current, Role::iq, Role::power}) {
-    if (log.has(role)) note_standing_load(log, role);
   }
   note_missing_input(log);
   note_missing_readings(log);

@@ -36,7 +36,13 @@ void forget_frozen_input(Log& log) {
   if (!is_noisy(elsewhere, range)) return;
   for (const auto& [from, to] : frozen) {
     const double stood_s = t[to - 1] - t[from];
-    if (std::abs(v[from]) < 0.1 * range || stood_s < least_s) continue;
+    if (v[from] == 0 || stood_s < least_s) continue;
+    if (std::abs(v[from]) < 0.1 * range) {  // rest, told by a coarse sensor, looks alike
+      log.notes.push_back(fmt::format(
+          "{} stands still at {:.4g} for {:.0f} s from {:.0f} s; if it was not measured there, leave those rows out.",
+          own_name(role), v[from], stood_s, t[from]));
+      continue;
+    }
     log.notes.push_back(fmt::format("{} stood frozen at {:.4g} for {:.0f} s from {:.0f} s; what flowed is not known.",
                                     own_name(role), v[from], stood_s, t[from]));
     for (std::size_t i = from + 1; i < to; ++i) v[i] = missing;

@@ -9,6 +9,13 @@
 
 namespace identify {
 
+/// Of how late a sensor is, the share that a pause leaves: none is shorter than 5 s (log/pauses.cpp), in which a sensor
+/// that lags by much less has caught up.
+template <class S>
+S still_late(const S& lag_s) {
+  return lag_s * lag_s / (lag_s * lag_s + 25.0);
+}
+
 template <class S>
 struct Model {
   thermal::HeatSet<S> set{};

@@ -176,9 +176,11 @@ HOTCORE_FLATTEN void run(const Model<S>& model, const thermal::HeatNetwork<S, n>
     for (int i = 0; i < n && begun > 0; ++i) forget(T[i], from.own);
     T[housing] = from.housing_degC;
     lagged = from.sensed_degC;
-    // A late sensor is where it reads, and not where the housing is.
+    // A late sensor is where it reads, and not where the housing is, unless the pause was long enough to catch up.
     const double read = log.starts[begun].housing_degC;
-    if (begun > 0 && lags && !std::isnan(read)) lagged = housing_behind(set.housing, S(read));
+    if (begun > 0 && lags && !std::isnan(read)) {
+      lagged += (housing_behind(set.housing, S(read)) - lagged) * still_late(set.housing.lag_s);
+    }
     T[model.core] = from.core_degC;
     if (model.hot_node >= 0) T[model.hot_node] = from.core_degC;
     felt = from.core_degC;

@@ -376,23 +376,6 @@ TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   says(log.notes[0], "housing_degC stood frozen at one value in 1 stretch (40 rows");
 }
 
-TEST(Reader, ALoadThatStandsStillAmongNoiseIsSaid) {
-  const auto notes = [](bool measured, double stands_A) {
-    std::mt19937 random(3);
-    std::normal_distribution<double> noise(0, 0.02);
-    std::string text = head;
-    for (int i = 0; i < 900; ++i) {
-      const bool stands = i >= 300 && i < 500;
-      const double load_A = measured && !stands ? 3 + noise(random) : stands ? stands_A : i < 300 ? 3 : 1;
-      text += fmt::format("{},{:.3f},{:.2f}\n", 0.1 * i, load_A, 22 + 0.01 * i + noise(random));
-    }
-    return fmt::format("{}", fmt::join(read(text)[0].notes, " "));
-  };
-  says(notes(true, 3.1), "current_A stands at one value for 20 s from 30 s");
-  EXPECT_EQ(notes(true, 0).find("stands"), std::string::npos) << "switched off";
-  EXPECT_EQ(notes(false, 3.1).find("stands"), std::string::npos) << "commanded";
-}
-
 TEST(Reader, AUnitInBracketsThatIsNotKnownIsSaidNotToBeUsed) {
   const auto speed = [](const std::string& column) {
     ColumnMap map;
@@ -1695,6 +1678,20 @@ TEST(Pauses, AMeasuredCurrentThatStandsStillUnderLoadIsOne) {
   EXPECT_EQ(stands([&](int i, double) { return held(i) ? 1.4321 : i % 2 * 3.0; }), 0u) << "commanded pulses";
   EXPECT_EQ(stands([&](int i, double noise) { return held(i) ? 1.4 : 0.1 * std::round(20 + 3 * noise); }), 0u)
       << "a coarse current";
+}
+TEST(Pauses, AMeasuredCurrentThatStandsStillNearRestIsOnlySaid) {
+  const auto notes = [](double rest_A, bool measured) {
+    const auto log = read(recording(400, [&](int i, double& current_A, double&) {
+      if (!measured) current_A = 2;
+      if (i >= 300) current_A = rest_A;
+      return true;
+    }))[0];
+    EXPECT_TRUE(log.resumes_s.empty());
+    return fmt::format("{}", fmt::join(log.notes, " "));
+  };
+  says(notes(0.02, true), "current_A stands still at 0.02 for 99 s from 300 s; if it was not measured there");
+  EXPECT_EQ(notes(0, true).find("stands"), std::string::npos) << "switched off";
+  EXPECT_EQ(notes(0.02, false).find("stands"), std::string::npos) << "commanded";
 }
 TEST(Pauses, ALoggerThatWritesSeldomAtRestMakesNone) {
   const auto logs = read(recording(2000, [](int i, double&, double&) { return i / 200 % 4 != 3 || i % 10 == 0; }));

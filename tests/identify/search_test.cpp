@@ -25,6 +25,7 @@
 #include "identify/fit/leeway.hpp"
 #include "identify/fit/parallel.hpp"
 #include "identify/fit/replayed.hpp"
+#include "identify/log/pauses.hpp"
 #include "identify/log/table.hpp"
 #include "identify/search/problem_of.hpp"
 #include "tests/identify/bench.hpp"
@@ -261,6 +262,28 @@ TEST(SlowSearch, AThirdMassAChangeOfCoolingAndALateSensorGoOnThroughAPause) {
     EXPECT_TRUE(names(found)) << id << ": " << found.steps.back();
     ASSERT_FALSE(found.tied.empty()) << id;
     EXPECT_EQ(found.tied.front(), std::vector<std::string>{id});
+  }
+}
+
+TEST(SlowSearch, AConnectionThatIsLostNowAndThenMakesNoLateSensor) {
+  for (const auto& [id, seed] : {std::pair{"cooling_change", 24}, {"cooling_change", 25}, {"bridge_loss", 23}}) {
+    Hidden log = hidden({.duty = tests::Duty::designed, .seed = static_cast<std::uint64_t>(seed), .effects = {id}});
+    std::mt19937 random(static_cast<unsigned>(seed));
+    std::uniform_int_distribution<std::ptrdiff_t> told_rows(200, 800), lost_rows(60, 250);
+    for (std::ptrdiff_t row = told_rows(random); row + 300 < std::ssize(log.logs[0].of(identify::Role::time));
+         row += told_rows(random)) {
+      const std::ptrdiff_t lost = lost_rows(random);
+      for (auto& column : log.logs[0].columns) {
+        if (!column.empty()) column.erase(column.begin() + row, column.begin() + row + lost);
+      }
+    }
+    const auto parts = identify::parts_between_pauses(log.logs[0]);
+    ASSERT_EQ(parts.size(), 1u);
+    EXPECT_GT(parts[0].resumes_s.size(), 12u);
+    const auto found = identify::search(identify::problem_of(parts, log.log.sheet));
+    EXPECT_EQ(names(found), id == std::string("cooling_change")) << found.steps.back();
+    if (names(found))
+      EXPECT_EQ(found.tied.front(), std::vector<std::string>{id}) << "without paying for each pause: sensor_lag";
   }
 }
 
