@@ -182,7 +182,9 @@ void Session::set(const std::vector<Assignment>& assignments) {
   request(Kind::commit, {}, "put the parameters in force", slow_s);
 }
 
-void Session::save() { request(Kind::save, {}, "save its parameters", slow_s); }
+void Session::save() {
+  request(Kind::save, {}, "save its parameters, which are in force until the next reset", slow_s);
+}
 
 void Session::load(wire::LoadFrom from) {
   const wire::Load load{from};
