@@ -80,12 +80,13 @@ struct Arguments {
 
 // Electrical: 19 turns a second, so that phases share the heat of any winding (heat.params: R1 C1 is at least 0.5 s).
 constexpr float turning_rad_per_s = 120;
+constexpr double longest_stop_s = 180;
 
 /// Drives the designed course and logs it.
 Driven record(Console& console, int axis, const Values& before, const Arguments& a, const std::string& log) {
   Session& session = console.session();
   const auto mask = static_cast<std::uint8_t>(1 << axis);
-  const double rated_A = continuous_A(before);
+  const double rated_A = course_A(before);
   std::vector<Piece> course = designed_course(rated_A, a.minutes);
   double length_s = 0, told_s = -1e9;
   for (const Piece& piece : course) length_s += double{piece.seconds};
@@ -116,8 +117,14 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
       Armed armed(session, mask);
       if (a.turning) {
         play(cold_course(before), turning_rad_per_s);
-        // At rest, as the log has to begin.
-        play({{0, 2}}, 0);
+        // At rest, as the log has to begin: a joint's inertia takes a minute, for little current brakes it.
+        const double start_s = session.now_s();
+        do {
+          if (session.now_s() - start_s > longest_stop_s)
+            refuse_data(fmt::format("The shaft of axis {} does not come to rest; free it of what drives it.", axis));
+          play({{0, 2}}, 0);
+        } while (std::fabs(session.state().axis[axis].speed_rad_per_s) >
+                 0.01f * turning_rad_per_s / before.at("pole_pairs"));
         if (!winding.begin())
           console.tell(
               fmt::format("The winding cannot be read: {:.1f} and {:.1f} A did not flow, or --leads is too much; is "
@@ -190,7 +197,7 @@ void identify(Console& console, const Arguments& a) {
   const int axis = a.axis == "1" ? 1 : 0;
   need_mode(console, static_cast<std::uint8_t>(1 << axis), wire::ControlMode::current);
   const Values before = values_of(session, axis);
-  const double rated_A = continuous_A(before);
+  const double rated_A = course_A(before);
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
   console.tell(fmt::format(

@@ -27,7 +27,8 @@ console::Values believed() {
           {"C1_J_per_K", 1.13f},          {"C2_J_per_K", 18.04f},
           {"winding_max_degC", 155.0f},   {"ambient_degC", 40.0f},
           {"housing_noise_K", 0.5f},      {"housing_offset_K", 0.0f},
-          {"housing_lag_s", 0.0f},        {"copper_coefficient_per_K", 0.00393f}};
+          {"housing_lag_s", 0.0f},        {"copper_coefficient_per_K", 0.00393f},
+          {"current_limit_A", 20.0f}};
 }
 
 std::string file(const std::string& name, const std::string& text) {
@@ -40,6 +41,17 @@ TEST(HeatExperiment, TheContinuousCurrentHoldsTheLimitInTheEnd) {
   const double amplitude_A = console::continuous_A(believed());
   const double heat_W = 1.5 * 0.5 * (1 + 0.00393 * 130) * amplitude_A * amplitude_A;
   EXPECT_NEAR(heat_W * (1.08 + 16.3), 115.0, 1e-3);
+}
+
+TEST(HeatExperiment, NoCurrentOfTheCourseIsBeyondTheAxisLimit) {
+  auto values = believed();
+  EXPECT_EQ(console::course_A(values), console::continuous_A(values));
+  values["current_limit_A"] = 5.0f;
+  float most_A = 0;
+  for (const auto& piece : console::cold_course(values)) most_A = std::max(most_A, piece.level);
+  for (const auto& piece : console::designed_course(console::course_A(values), 17))
+    most_A = std::max(most_A, piece.level);
+  EXPECT_FLOAT_EQ(most_A, 5.0f);
 }
 
 TEST(HeatExperiment, AnUnsetParameterIsNamed) {
@@ -91,6 +103,15 @@ TEST(HeatExperiment, AModelOfTwoResistorsBecomesParameters) {
                                     {"housing_offset_K", -1.5f},
                                     {"copper_coefficient_per_K", 0.004f}};
   EXPECT_EQ(found, expected) << why;
+}
+
+TEST(HeatExperiment, AModelWithoutAMassLeavesNothingOfOneToSave) {
+  console::Values before = believed();
+  before["third_mass_J_per_K"] = 80.0f, before["third_mass_path_K_per_W"] = 2.0f;
+  std::string why;
+  const auto found = console::parameters_of_model(file("model.toml", two_resistors), before, why);
+  EXPECT_EQ(found.at("third_mass_J_per_K"), 0.0f);
+  EXPECT_EQ(found.at("third_mass_path_K_per_W"), 1.0f);
 }
 
 TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
@@ -244,6 +265,24 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreOfferedWhereItWasReadAndTellsThem) {
   EXPECT_FLOAT_EQ(console::offer(read, gain, believed(), true).values.at("C1_J_per_K"), 1.7f);
   read["baseline"]["parameters"][0]["determined"] = false;
   EXPECT_FALSE(console::offer(read, model, believed(), true).values.contains("R1_K_per_W"));
+}
+
+/// With a fifth of leads in it the winding's resistance shows four fifths of each rise.
+TEST(HeatExperiment, ASensorThatSeemsToReadTooMuchIsTakenForLeadsInTheWindingsResistance) {
+  console::Values before = told_to_this_firmware(0);
+  nlohmann::json read = answer(0.1, true);
+  read["baseline"]["rmse_K"]["core"] = 0.8;
+  const std::string much = file("model.toml", two_resistors + "[housing_sensor]\ngain_error = 0.25\n");
+  const auto hot = console::offer(read, much, before, true);
+  EXPECT_FLOAT_EQ(hot.values.at("R1_K_per_W"), 2.0f * 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("R2_K_per_W"), 10.0f * 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("C1_J_per_K"), 0.5f / 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("C2_J_per_K"), 20.0f / 1.25f);
+  EXPECT_EQ(hot.values.at("sensor_gain_share"), 0.0f);
+  EXPECT_EQ(hot.values.at("third_mass_path_K_per_W"), 1.0f) << "of a mass that is none";
+  EXPECT_NE(hot.note.find("25 % too much is taken for leads"), std::string::npos) << hot.note;
+  const std::string little = file("model.toml", two_resistors + "[housing_sensor]\ngain_error = -0.25\n");
+  EXPECT_FLOAT_EQ(console::offer(read, little, before, true).values.at("sensor_gain_share"), -0.25f);
 }
 
 TEST(HeatExperiment, TrustInTheCoolingIsOfferedWhereTheRoomIsTold) {
