@@ -10,7 +10,9 @@
 #include <fstream>
 
 #include "boards/host/heat_file.hpp"
+#include "console/commands.hpp"
 #include "console/dictionary.hpp"
+#include "console/link/sim.hpp"
 #include "firmware/heat_parameters.hpp"
 #include "thermal/losses.hpp"
 #include "thermal/motor_set.hpp"
@@ -73,6 +75,34 @@ TEST(HeatExperiment, TheCourseHasItsLengthAndNoBurstBeyondItsShare) {
   }
   EXPECT_NEAR(length_s, 17 * 60, 1e-3);
   EXPECT_DOUBLE_EQ(most_A, 10.0);
+}
+
+/// This rotor coasts for seconds, and 1.8 and 2.5 times its continuous current are more than the board gives.
+TEST(HeatExperiment, AHeavyRotorsLogBeginsAtRestWithReadingsOfItsWinding) {
+  console::Console console([](const console::Options&) {
+    return console::link::simulated_board(
+        {.real_time = false, .motor_folder = HOTCORE_SOURCE_DIR "/boards/motors", .motor = "ec-powermax-30-24v"});
+  });
+  const std::string folder = testing::TempDir() + "heavy";
+  testing::internal::CaptureStdout();
+  (void)console::run_line(console, [&](CLI::App& app) {
+    app.parse("--sim identify --turning --minutes 1 --ambient 25 --force --out " + folder);
+  });
+  testing::internal::GetCapturedStdout();
+  std::ifstream in(folder + "/log.csv");
+  std::string line;
+  int rows = 0, readings = 0;
+  while (std::getline(in, line)) {
+    if (line.empty() || line[0] == '#' || line[0] == 't') continue;
+    std::vector<std::string> cells(1);
+    for (const char c : line) c == ',' ? void(cells.emplace_back()) : cells.back().push_back(c);
+    if (rows++ == 0) {
+      EXPECT_LT(std::abs(std::stod(cells.at(6))), 0.02 * 60) << "rad/s: " << line;
+    }
+    readings += cells.back().empty() ? 0 : 1;
+  }
+  EXPECT_GT(rows, 1000);
+  EXPECT_GT(readings, 5);
 }
 
 TEST(HeatExperiment, TheSheetSaysWhatTheBoardBelieves) {
