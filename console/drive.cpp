@@ -18,6 +18,7 @@ constexpr double interval_s = 0.005;  // a twentieth of the time-out of setpoint
 constexpr float hold_A_s_per_rad = 0.002f, hold_most_A = 0.2f;
 // To turn a free shaft against its friction, whatever that is: within seconds, up to what a motor of 40 W needs idle.
 constexpr float turn_A_per_rad = 0.002f, turn_most_A = 0.5f;
+constexpr double longest_still_s = 10;  // a free shaft with the inertia of a joint is turning within 3 s
 
 /// The iq of a shaft that is held, or kept turning.
 class Hold {
@@ -32,9 +33,15 @@ class Hold {
     against_friction_A_ = std::clamp(against_friction_A_, 0.0f, turn_most_A);
     current_A_ += against_friction_A_;
   }
+  /// False: it has been slower than half of what it should for too long.
+  bool turns(float rad_per_s, double time_s) {
+    if (std::fabs(rad_per_s) >= 0.5f * rad_per_s_) turned_s_ = time_s;
+    return time_s - turned_s_ < longest_still_s;
+  }
 
  private:
   float rad_per_s_, current_A_ = 0, against_friction_A_ = 0;
+  double turned_s_ = 0;
 };
 
 }  // namespace
@@ -102,7 +109,16 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
           throw UserError(Exit::refused, fmt::format("Axis {} tripped after {:.2f} s: {}.", a, now_s - start_s,
                                                      fault_sentence(session.fault(a))));
         }
-        if (!torque) hold[static_cast<std::size_t>(a)].see(state.axis[a].speed_rad_per_s);
+        if (!torque) {
+          Hold& shaft = hold[static_cast<std::size_t>(a)];
+          shaft.see(state.axis[a].speed_rad_per_s);
+          if (!shaft.turns(state.axis[a].speed_rad_per_s, now_s - start_s)) {
+            refuse_data(fmt::format(
+                "The shaft of axis {} does not turn, so its phases warm unequally and its resistance tells no "
+                "temperature: free it, or leave out --turning.",
+                a));
+          }
+        }
         if (state.axis[a].refused != 0) {
           const wire::CodeText text = wire::text_of(state.axis[a].refused);
           throw UserError(Exit::refused, fmt::format("Axis {} refused the setpoint {:g} {}: {}; {}.", a, piece.level,

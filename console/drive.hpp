@@ -45,8 +45,8 @@ enum class Along { q, d };
 
 /// Plays a course on the axes in `mask`, 200 setpoints a second; `look` sees every state. What it came to is told of
 /// these axes. Throws UserError: refused
-/// when an axis trips or refuses a setpoint (as one that has another control mode does), interrupted after Ctrl-C,
-/// gone. The caller holds an Armed.
+/// when an axis trips or refuses a setpoint (as one that has another control mode does), unusable when a shaft that
+/// should turn stands for 10 s, interrupted after Ctrl-C, gone. The caller holds an Armed.
 std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, const std::vector<Piece>& profile,
                                            Along along, const std::function<void(const wire::State&, double)>& look,
                                            float turning_rad_per_s = 0);

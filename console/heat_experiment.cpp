@@ -49,6 +49,30 @@ void leave_out_cooler(Offer& offer, const Values& before) {
       fmt::join(left_out, ", "));
 }
 
+/// Leads that nobody told of make the winding read too little, which looks like a housing sensor that reads too much;
+/// of both meanings that is the hotter one. Differences of temperature are then larger by the gain, at the same heat.
+void take_gain_for_leads(Offer& offer) {
+  const auto gain = offer.values.find("sensor_gain_share");
+  if (gain == offer.values.end() || !(gain->second > 0)) return;
+  const float larger = 1 + gain->second;
+  const auto times = [&](const char* name, float factor) {
+    if (const auto found = offer.values.find(name); found != offer.values.end()) found->second *= factor;
+  };
+  for (const char* way : {"R1_K_per_W", "R2_K_per_W"}) times(way, larger);
+  for (const char* less : {"C1_J_per_K", "C2_J_per_K", "third_mass_J_per_K", "radiation_W_per_K"})
+    times(less, 1 / larger);
+  if (const auto mass = offer.values.find("third_mass_J_per_K"); mass != offer.values.end() && mass->second > 0)
+    times("third_mass_path_K_per_W", larger);
+  // The conductance goes with that power of the difference.
+  if (const auto power = offer.values.find("natural_convection"); power != offer.values.end())
+    times("R2_K_per_W", std::pow(larger, power->second));
+  offer.note += fmt::format(
+      "; that the housing's sensor reads {:.0f} % too much is taken for leads (--leads) that were not told, the hotter "
+      "of both",
+      100 * gain->second);
+  gain->second = 0;
+}
+
 /// A parameter of two resistors, or of them with what was found; nothing where the log does not tell it.
 std::optional<double> told(const nlohmann::json& lines, const char* name) {
   for (const auto& line : lines) {
@@ -68,8 +92,12 @@ double continuous_A(const Values& values) {
   return std::sqrt(rise_K / (1.5 * get("phase_resistance_ohm") * warm * (get("R1_K_per_W") + get("R2_K_per_W"))));
 }
 
+double course_A(const Values& values) {
+  return std::min(continuous_A(values), value_of(values, "current_limit_A") / larger_share);
+}
+
 std::vector<Piece> cold_course(const Values& values) {
-  const double rated_A = continuous_A(values);
+  const double rated_A = course_A(values);
   // Five time constants as the board believes them, which may be off by a few times.
   const double rest_s = std::clamp(5 * value_of(values, "R1_K_per_W") * value_of(values, "C1_J_per_K"), 3.0, 20.0);
   const auto look = [&](double share) {
@@ -83,7 +111,7 @@ std::vector<Piece> cold_course(const Values& values) {
   return course;
 }
 
-std::vector<Piece> designed_course(double continuous_A, double minutes) {
+std::vector<Piece> designed_course(double course_A, double minutes) {
   // Shares of the continuous current and seconds: levels apart by design, bursts short enough for any winding that the
   // look-ahead of a healthy board allows, rests in between; the log begins at rest.
   constexpr struct {
@@ -98,7 +126,7 @@ std::vector<Piece> designed_course(double continuous_A, double minutes) {
   double left_s = 60 * minutes;
   for (int i = 0; left_s > 0; i = (i + 1) % static_cast<int>(std::size(round))) {
     const double seconds = std::min(round[i].seconds, left_s);
-    course.push_back({static_cast<float>(round[i].share * continuous_A), static_cast<float>(seconds)});
+    course.push_back({static_cast<float>(round[i].share * course_A), static_cast<float>(seconds)});
     left_s -= seconds;
   }
   return course;
@@ -178,6 +206,7 @@ Values parameters_of_model(const std::string& path, const Values& before, std::s
   // What a model does not have, it has none of.
   for (const char* none : {"sensor_gain_share", "radiation_W_per_K", "neighbour_heat_W_per_K", "third_mass_J_per_K"})
     found[none] = 0;
+  if (before.contains("third_mass_path_K_per_W")) found["third_mass_path_K_per_W"] = 1;  // its default: nothing to save
   for (const auto& source : board_sources) found[source.parameter] = 0;
   for (const auto& law : board_laws) found[law.parameter] = 0;
 
@@ -287,6 +316,7 @@ Offer offer(const nlohmann::json& answer, const std::string& model_path, const V
         "; R1 and C1 stay: a housing sensor alone does not tell the winding well enough (--turning reads "
         "the winding, where the shaft is free)";
   }
+  if (tells_winding) take_gain_for_leads(offer);
   if (!room_told) leave_out_cooler(offer, before);
   return offer;
 }

@@ -19,16 +19,19 @@ using Values = std::map<std::string, float>;
 /// Throws UserError (usage) naming the first one that is unset.
 double continuous_A(const Values& values);
 
-/// At this current the winding's resistance is read, as share of the continuous one: what dead time adds hangs on the
+/// What the shares of both courses are of: the continuous current, or as much less as lets the larger current flow.
+double course_A(const Values& values);
+
+/// At this current the winding's resistance is read, as share of that: what dead time adds hangs on the
 /// rotor's angle, which may creep, by 8 K of an EC 16 at 0.9, and by 1.7 K here.
 inline constexpr double probe_share = 1.8, larger_share = 2.5;
 /// While all is cold: four times the probe, the larger current and the probe; then five times the probe; and after each
 /// a rest in which the winding cools.
 std::vector<Piece> cold_course(const Values& values);
 /// Steps of a minute and more tell the housing's resistance and capacity, bursts of seconds the winding's, rests both;
-/// after each burst and in rests the winding is read. Amperes are shares of the continuous current up to 2.5 times; the
+/// after each burst and in rests the winding is read. Amperes are shares of course_A up to 2.5 times; the
 /// governor may cut bursts, which the log then shows.
-std::vector<Piece> designed_course(double continuous_A, double minutes);
+std::vector<Piece> designed_course(double course_A, double minutes);
 
 /// A motor sheet (TOML) that says what the board believes: identify's gauge is then the board's resistance.
 std::string sheet_of(const Values& values, const std::string& name);

@@ -85,7 +85,7 @@ constexpr float turning_rad_per_s = 120;
 Driven record(Console& console, int axis, const Values& before, const Arguments& a, const std::string& log) {
   Session& session = console.session();
   const auto mask = static_cast<std::uint8_t>(1 << axis);
-  const double rated_A = continuous_A(before);
+  const double rated_A = course_A(before);
   std::vector<Piece> course = designed_course(rated_A, a.minutes);
   double length_s = 0, told_s = -1e9;
   for (const Piece& piece : course) length_s += double{piece.seconds};
@@ -190,7 +190,7 @@ void identify(Console& console, const Arguments& a) {
   const int axis = a.axis == "1" ? 1 : 0;
   need_mode(console, static_cast<std::uint8_t>(1 << axis), wire::ControlMode::current);
   const Values before = values_of(session, axis);
-  const double rated_A = continuous_A(before);
+  const double rated_A = course_A(before);
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
   console.tell(fmt::format(

@@ -18,6 +18,8 @@ using wire::pc::UserError;
 // An answer takes milliseconds; the slow ones erase a flash sector (up to 2 s on an STM32F405, its data sheet's Table
 // 43, rounded up) or think ahead over hours.
 constexpr double slow_s = 5.0;
+// 60 s ahead take a board 1.2 s, in the dearest model up to 6 s.
+constexpr double look_ahead_s = 15.0;
 
 template <class Message>
 std::span<const std::uint8_t> bytes_of(const Message& message) {
@@ -180,7 +182,9 @@ void Session::set(const std::vector<Assignment>& assignments) {
   request(Kind::commit, {}, "put the parameters in force", slow_s);
 }
 
-void Session::save() { request(Kind::save, {}, "save its parameters", slow_s); }
+void Session::save() {
+  request(Kind::save, {}, "save its parameters, which are in force until the next reset", slow_s);
+}
 
 void Session::load(wire::LoadFrom from) {
   const wire::Load load{from};
@@ -225,7 +229,7 @@ wire::Outlook Session::ask(int axis, std::span<const wire::Segment> segments, bo
   Payload payload;
   payload.add(wire::Ask{static_cast<std::uint8_t>(axis), static_cast<std::uint8_t>(standing ? 1 : 0)});
   for (const wire::Segment& segment : segments) payload.add(segment);
-  return asked<wire::Outlook>(Kind::ask, payload, "look ahead", slow_s);
+  return asked<wire::Outlook>(Kind::ask, payload, "look ahead", look_ahead_s);
 }
 
 void Session::subscribe(const std::vector<Target>& signals, std::uint16_t decimation,

@@ -23,10 +23,11 @@ class WindingLog {
 
   explicit WindingLog(const Ohmmeter& ohmmeter) : ohmmeter_(ohmmeter) {}
 
-  /// First what the ohmmeter needs.
+  /// First what the ohmmeter needs. No speed: there is one only, at which what goes by speed cannot be told from more
+  /// or less copper loss, of which a standing rotor then had another; and a heavy one coasts into the log's rest.
   static std::vector<Target> signals(Session& session, int axis) {
-    return signals_called({"id_permitted_A", "id_A", "vd_asked_V", "voltage_share", "current_A", "speed_rad_per_s",
-                           "bus_V", "housing_measured_degC", "ambient_degC", "board_degC", "core_a_degC", "core_b_degC",
+    return signals_called({"id_permitted_A", "id_A", "vd_asked_V", "voltage_share", "current_A", "bus_V",
+                           "housing_measured_degC", "ambient_degC", "board_degC", "core_a_degC", "core_b_degC",
                            "core_c_degC", "housing_degC", "allowance_A", "limit"},
                           session.signals(), axis);
   }

@@ -100,9 +100,9 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
   unit[Drive::current_A2] = 1.0;
   unit[Drive::current2_speed2] = core.input()[Drive::speed2_rad2_per_s2];
   const double capacity_J_per_K = core.network().capacity_J_per_K(node);
-  const double hold_W = -core.network().rate_K_per_s(held, rest)[node] * capacity_J_per_K;
+  const double hold_W = -core.network().rate_K_per_s(node, held, rest) * capacity_J_per_K;
   held[node] -= 1.0;
-  const double colder_W = -core.network().rate_K_per_s(held, rest)[node] * capacity_J_per_K;
+  const double colder_W = -core.network().rate_K_per_s(node, held, rest) * capacity_J_per_K;
   // In a burst k sigma grows with the rise: what is limited moves like a winding that stores less.
   const double burst_J_per_K = capacity_J_per_K / static_cast<double>(core.burst_margin());
   return {now.max_degC[node], static_cast<float>(burst_J_per_K), static_cast<float>(hold_W),

@@ -21,6 +21,7 @@ HeatInput<> future_input(const CoreEstimator& core, float current_A, const Phase
   input[Drive::current_A] = i_A;
   input[Drive::current2_speed2] = i_A2 * input[Drive::speed2_rad2_per_s2];
   input[Drive::current_speed] = i_A * input[Drive::speed_rad_per_s];
+  input[Drive::enabled] = 1.0;  // a bridge at rest is asked what it will do
   input[Drive::power_W] = 0.0;  // bus power and ripple of the past say nothing about the next motion
   return input;
 }

@@ -89,6 +89,7 @@ class HeatNetwork {
   }
 
   const Scalar& capacity_J_per_K(int node) const { return capacity_J_per_K_[node]; }
+  bool curved() const { return curved_count_ > 0; }  // a link's law is no constant: a step costs three times as much
 
   Transition<Scalar, N> transition(double dt_s) const {
     Transition<Scalar, N> t;
@@ -123,14 +124,18 @@ class HeatNetwork {
     return next;
   }
 
-  /// dT/dt at given temperatures, K/s: what step() integrates.
+  /// dT/dt of one node at given temperatures: what step() integrates. Only what touches it costs.
   template <class Data>
-  Vector rate_K_per_s(const Vector& degC, const HeatInput<Data>& input) const {
+  Scalar rate_K_per_s(int node, const Vector& degC, const HeatInput<Data>& input) const {
     Vector base = Vector::Zero(n_), slope = Vector::Zero(n_);
     gather(input, base, slope);
-    Vector s = base + slope.cwiseProduct(degC);
-    if (curved_count_ > 0) add_curved(degC, input, s);
-    return s + a_.lazyProduct(degC);
+    base[node] += slope[node] * degC[node];
+    for (int i = 0; i < curved_count_; ++i) {
+      if (curved_[i].from == node || curved_[i].to == node) add_curved(curved_[i], degC, input, base);
+    }
+    Scalar inner = a_(node, 0) * degC[0];
+    for (int i = 1; i < n_; ++i) inner += a_(node, i) * degC[i];
+    return base[node] + inner;
   }
 
   /// dT/dt told apart by where the heat comes from: what the covariance needs.
@@ -146,16 +151,17 @@ class HeatNetwork {
     gather(input, base, slope);
     Rates r;
     r.outer_K_per_s = Vector::Zero(n_);
+    if (curved_count_ > 0) add_curved(degC, input, r.outer_K_per_s);
+    const Vector all_K_per_s = base + slope.cwiseProduct(degC) + r.outer_K_per_s + a_.lazyProduct(degC);
     for (int i = 0; i < boundary_count_; ++i) {
       const BoundaryTerm& b = boundaries_[i];
       const Scalar given = b.per_s * input.boundary_degC[b.boundary];
       base[b.node] -= given;
       r.outer_K_per_s[b.node] += given - b.per_s * degC[b.node];
     }
-    if (curved_count_ > 0) add_curved(degC, input, r.outer_K_per_s);
     r.source_slope_per_s = slope;
     r.sources_K_per_s = base + slope.cwiseProduct(degC);
-    r.inner_K_per_s = rate_K_per_s(degC, input) - r.sources_K_per_s - r.outer_K_per_s;
+    r.inner_K_per_s = all_K_per_s - r.sources_K_per_s - r.outer_K_per_s;
     return r;
   }
 
@@ -228,13 +234,15 @@ class HeatNetwork {
   /// What the curved laws carry beyond their plain G, as K/s at both ends.
   template <class Data>
   void add_curved(const Vector& degC, const HeatInput<Data>& input, Vector& rate) const {
-    for (int i = 0; i < curved_count_; ++i) {
-      const Link<Scalar>& link = curved_[i];
-      const Scalar from = end_degC(link.from, degC, input), to = end_degC(link.to, degC, input);
-      const Scalar extra_W = link.conductance_W_per_K * excess_K(link, from, to, input);
-      if (link.from < first_boundary) rate[link.from] += extra_W / capacity_J_per_K_[link.from];
-      if (link.to < first_boundary) rate[link.to] -= extra_W / capacity_J_per_K_[link.to];
-    }
+    for (int i = 0; i < curved_count_; ++i) add_curved(curved_[i], degC, input, rate);
+  }
+
+  template <class Data>
+  void add_curved(const Link<Scalar>& link, const Vector& degC, const HeatInput<Data>& input, Vector& rate) const {
+    const Scalar from = end_degC(link.from, degC, input), to = end_degC(link.to, degC, input);
+    const Scalar extra_W = link.conductance_W_per_K * excess_K(link, from, to, input);
+    if (link.from < first_boundary) rate[link.from] += extra_W / capacity_J_per_K_[link.from];
+    if (link.to < first_boundary) rate[link.to] -= extra_W / capacity_J_per_K_[link.to];
   }
 
   template <class Data>

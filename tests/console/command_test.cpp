@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "console/commands.hpp"
+#include "console/drive.hpp"
 #include "console/live.hpp"
 #include "console/plot.hpp"
 #include "console/profile.hpp"
@@ -208,6 +209,24 @@ TEST_F(Commands, TheModeIsChosenToldAndKeptToItsUnit) {
   refused("mode voltage", 2, "MODE");
   refused("run \"1A 1s, 1Nm 1s\"", 2, "has another unit than the pieces before it");
   refused("arm --iq 1 --torque 1", 2, "excludes");
+}
+
+TEST_F(Commands, AShaftThatShouldTurnAndStandsIsToldBeforeAnythingIsMadeOfIt) {
+  console::Session session(std::make_unique<FakeTransport>(board_));
+  const auto play = [&](float turning_rad_per_s) {
+    console::Armed armed(session, 1);
+    return console::drive(
+        session, 1, {{1.0f, 12.0f}}, console::Along::d, [](const wire::State&, double) {}, turning_rad_per_s)[0];
+  };
+  EXPECT_NEAR(play(0).seconds, 12, 0.1);
+  try {
+    (void)play(120);
+    FAIL();
+  } catch (const wire::pc::UserError& error) {
+    EXPECT_EQ(error.exit_code(), 3);
+    EXPECT_NE(std::string(error.what()).find("The shaft of axis 0 does not turn"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(board_->armed, 0);
 }
 
 TEST_F(Commands, ArmedIsSaidOnceItIs) {

@@ -8,9 +8,12 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "boards/host/heat_file.hpp"
+#include "console/commands.hpp"
 #include "console/dictionary.hpp"
+#include "console/link/sim.hpp"
 #include "firmware/heat_parameters.hpp"
 #include "thermal/losses.hpp"
 #include "thermal/motor_set.hpp"
@@ -27,7 +30,8 @@ console::Values believed() {
           {"C1_J_per_K", 1.13f},          {"C2_J_per_K", 18.04f},
           {"winding_max_degC", 155.0f},   {"ambient_degC", 40.0f},
           {"housing_noise_K", 0.5f},      {"housing_offset_K", 0.0f},
-          {"housing_lag_s", 0.0f},        {"copper_coefficient_per_K", 0.00393f}};
+          {"housing_lag_s", 0.0f},        {"copper_coefficient_per_K", 0.00393f},
+          {"current_limit_A", 20.0f}};
 }
 
 std::string file(const std::string& name, const std::string& text) {
@@ -40,6 +44,17 @@ TEST(HeatExperiment, TheContinuousCurrentHoldsTheLimitInTheEnd) {
   const double amplitude_A = console::continuous_A(believed());
   const double heat_W = 1.5 * 0.5 * (1 + 0.00393 * 130) * amplitude_A * amplitude_A;
   EXPECT_NEAR(heat_W * (1.08 + 16.3), 115.0, 1e-3);
+}
+
+TEST(HeatExperiment, NoCurrentOfTheCourseIsBeyondTheAxisLimit) {
+  auto values = believed();
+  EXPECT_EQ(console::course_A(values), console::continuous_A(values));
+  values["current_limit_A"] = 5.0f;
+  float most_A = 0;
+  for (const auto& piece : console::cold_course(values)) most_A = std::max(most_A, piece.level);
+  for (const auto& piece : console::designed_course(console::course_A(values), 17))
+    most_A = std::max(most_A, piece.level);
+  EXPECT_FLOAT_EQ(most_A, 5.0f);
 }
 
 TEST(HeatExperiment, AnUnsetParameterIsNamed) {
@@ -61,6 +76,27 @@ TEST(HeatExperiment, TheCourseHasItsLengthAndNoBurstBeyondItsShare) {
   }
   EXPECT_NEAR(length_s, 17 * 60, 1e-3);
   EXPECT_DOUBLE_EQ(most_A, 10.0);
+}
+
+/// Its rotor coasts into the rest by which the log begins, and 1.8 and 2.5 times its continuous current are more than
+/// the board gives.
+TEST(HeatExperiment, OfAHeavyRotorOnABoardTooSmallForItTheWindingIsReadAsWell) {
+  console::Console console([](const console::Options&) {
+    return console::link::simulated_board(
+        {.real_time = false, .motor_folder = HOTCORE_SOURCE_DIR "/boards/motors", .motor = "ec-powermax-30-24v"});
+  });
+  const std::string folder = testing::TempDir() + "heavy";
+  testing::internal::CaptureStdout();
+  (void)console::run_line(console, [&](CLI::App& app) {
+    app.parse("--sim identify --turning --minutes 1 --ambient 25 --force --out " + folder);
+  });
+  testing::internal::GetCapturedStdout();
+  const auto said = [&](const std::string& name) {
+    std::ifstream in(folder + "/" + name);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  EXPECT_NE(said("answer.json").find("winding_ohm is read as core_degC"), std::string::npos) << said("answer.json");
+  EXPECT_EQ(said("log.csv").find("speed_rad_per_s"), std::string::npos) << "at one speed nothing that goes by it shows";
 }
 
 TEST(HeatExperiment, TheSheetSaysWhatTheBoardBelieves) {
@@ -91,6 +127,15 @@ TEST(HeatExperiment, AModelOfTwoResistorsBecomesParameters) {
                                     {"housing_offset_K", -1.5f},
                                     {"copper_coefficient_per_K", 0.004f}};
   EXPECT_EQ(found, expected) << why;
+}
+
+TEST(HeatExperiment, AModelWithoutAMassLeavesNothingOfOneToSave) {
+  console::Values before = believed();
+  before["third_mass_J_per_K"] = 80.0f, before["third_mass_path_K_per_W"] = 2.0f;
+  std::string why;
+  const auto found = console::parameters_of_model(file("model.toml", two_resistors), before, why);
+  EXPECT_EQ(found.at("third_mass_J_per_K"), 0.0f);
+  EXPECT_EQ(found.at("third_mass_path_K_per_W"), 1.0f);
 }
 
 TEST(HeatExperiment, AModelWithMoreInItIsNotForcedIntoParameters) {
@@ -244,6 +289,24 @@ TEST(HeatExperiment, TheWindingsOwnValuesAreOfferedWhereItWasReadAndTellsThem) {
   EXPECT_FLOAT_EQ(console::offer(read, gain, believed(), true).values.at("C1_J_per_K"), 1.7f);
   read["baseline"]["parameters"][0]["determined"] = false;
   EXPECT_FALSE(console::offer(read, model, believed(), true).values.contains("R1_K_per_W"));
+}
+
+/// With a fifth of leads in it the winding's resistance shows four fifths of each rise.
+TEST(HeatExperiment, ASensorThatSeemsToReadTooMuchIsTakenForLeadsInTheWindingsResistance) {
+  console::Values before = told_to_this_firmware(0);
+  nlohmann::json read = answer(0.1, true);
+  read["baseline"]["rmse_K"]["core"] = 0.8;
+  const std::string much = file("model.toml", two_resistors + "[housing_sensor]\ngain_error = 0.25\n");
+  const auto hot = console::offer(read, much, before, true);
+  EXPECT_FLOAT_EQ(hot.values.at("R1_K_per_W"), 2.0f * 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("R2_K_per_W"), 10.0f * 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("C1_J_per_K"), 0.5f / 1.25f);
+  EXPECT_FLOAT_EQ(hot.values.at("C2_J_per_K"), 20.0f / 1.25f);
+  EXPECT_EQ(hot.values.at("sensor_gain_share"), 0.0f);
+  EXPECT_EQ(hot.values.at("third_mass_path_K_per_W"), 1.0f) << "of a mass that is none";
+  EXPECT_NE(hot.note.find("25 % too much is taken for leads"), std::string::npos) << hot.note;
+  const std::string little = file("model.toml", two_resistors + "[housing_sensor]\ngain_error = -0.25\n");
+  EXPECT_FLOAT_EQ(console::offer(read, little, before, true).values.at("sensor_gain_share"), -0.25f);
 }
 
 TEST(HeatExperiment, TrustInTheCoolingIsOfferedWhereTheRoomIsTold) {

@@ -60,6 +60,7 @@ file(WRITE ${SCRATCH}/found.toml "format = 1
 [[source]]\nnode = 0\ndrive = \"current_A2\"\ngain = 0.75\ncoefficient_per_K = 0.00393
 [housing_sensor]\nnode = 1\n[trust]\npower = 0.03\ninner_resistance = 0.05\ncooling = 0.06\ncorrelation = -0.4\n")
 expect(model 0 "axis1.R2_K_per_W +16.3 -> 20.*axis1.third_mass_J_per_K +0 -> 80.*axis1.trust_power_share +0.2 -> 0.03.*In force and saved" ${sim} model found.toml --axis 1 --yes --save)
+expect(a_save_that_is_refused_says_what_is_in_force 8 "refused to save its parameters, which are in force until the next reset: a save holds five" ${sim} set axis0.constant_heat_W=1 axis0.windage_Nms2=1e-9 axis0.board_heat_ohm=0.1 axis0.bridge_loss_V=0.1 axis0.enabled_loss_W=1 axis0.radiation_W_per_K=0.01 --save)
 expect(model_without_a_yes 0 "axis0.third_mass_path_K_per_W +1 -> 2.*Nothing was written; --yes" ${sim} model found.toml)
 file(READ ${SCRATCH}/found.toml found)
 file(WRITE ${SCRATCH}/spot.toml "${found}[[node]]\ncapacity_J_per_K = 1\nmax_degC = 155\n")

@@ -350,6 +350,7 @@ TEST(LookAhead, HeatThatFollowsTheCurrentAtAnySpeedIsForeseenAndPowerOfThePastIs
   const double expected_K = 10 * 0.2 / (1.13 / 3);
   EXPECT_NEAR(peak_degC(thermal::Drive::current_speed, 10.0 / (5 * 100)) - without, expected_K, 0.3 * expected_K);
   EXPECT_NEAR(peak_degC(thermal::Drive::current2_speed2, 10.0 / (25 * 1e4)) - without, expected_K, 0.3 * expected_K);
+  EXPECT_NEAR(peak_degC(thermal::Drive::enabled, 10) - without, expected_K, 0.3 * expected_K) << "the bridge was off";
   EXPECT_NEAR(peak_degC(thermal::Drive::power_W, 10), without, 0.5) << "10 W for 10 ms";
 }
 

@@ -69,7 +69,8 @@ TEST(Network, TenMillisecondStepsFollowABurstWithResistanceFeedback) {
   reference::TwoNodes truth{m};
   for (int i = 0; i < 36; ++i) {
     T = net.step(step, T, input_of(400, 25));
-    euler += 0.01 * net.rate_K_per_s(euler, input_of(400, 25));
+    euler += 0.01 * Eigen::Vector2d(net.rate_K_per_s(0, euler, input_of(400, 25)),
+                                    net.rate_K_per_s(1, euler, input_of(400, 25)));
     truth.advance(0.01L, 10, 400, 25);
   }
   const double true_degC = static_cast<double>(truth.degC[0]);
