@@ -52,6 +52,7 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
       index_(index) {
   judge(setup);
   take_over();
+  built_ = built_sum();
 }
 
 void Axis::configure(const AxisSetup& setup, HeatModel heat) {
@@ -118,6 +119,27 @@ void Axis::take_over() {
   pwm_Hz_ = rating_.pwm_Hz;
   period_s_ = 1.0f / rating_.pwm_Hz;
   if (fault_.fault == wire::Fault::parameters) cleared();
+}
+
+/// What the fast lane is built from, and the constants of the slow lane.
+std::uint32_t Axis::built_sum() const {
+  thermal::FlipSum sum;
+  guard_.add_built_to(sum);
+  rotor_.add_built_to(sum);
+  setpoint_.add_built_to(sum);
+  permit_.add_built_to(sum);
+  current_loop_.add_built_to(sum);
+  return sum
+      .add(rating_, next_, next_state_, dead_time_, usable_ratio_, A_per_Nm_, configured_, quiet_rad_per_s_per_V_,
+           offset_bound_A_, governor_.settings(), phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_, peak_A_,
+           blind_A_, senses_housing_, period_s_, index_)
+      .word();
+}
+
+/// What `configure` brought is another set until the fast lane has taken it over.
+bool Axis::built_as_it_was() const {
+  const bool waits = (commands_.load() & static_cast<unsigned>(Command::configure)) != 0;
+  return waits || built_sum() == built_;
 }
 
 // ---- fast lane ------------------------------------------------------------------------------------------------------
@@ -224,7 +246,7 @@ hal::Duty Axis::trip(const FaultRecord& found) {
   fault_ = found;
   fault_.axis = index_;
   tripped_periods_ = 0;
-  change(Event::trip);
+  set(Mode::tripped);
   return last_ = released;
 }
 
@@ -267,8 +289,13 @@ wire::Status Axis::clear() {
 /// What was posted since the last tick, the safest first; conditions are looked at again, for they may have changed.
 void Axis::obey() {
   const std::uint8_t posted = commands_.exchange(0);
-  const auto asked_for = [posted](Command c) { return (posted & static_cast<std::uint8_t>(c)) != 0; };
-  if (asked_for(Command::configure)) take_over();
+  const auto asked_for = [posted](Command c) {
+    return (posted & static_cast<std::uint8_t>(c)) == static_cast<std::uint8_t>(c);
+  };
+  if (asked_for(Command::configure)) {
+    take_over();
+    built_ = built_sum();
+  }
   if (asked_for(Command::disarm)) change(Event::disarm);
   if (asked_for(Command::clear) && setpoint_.is_zero() && fault_.fault != wire::Fault::parameters) {
     if (mode_ == Mode::tripped) cleared();
@@ -278,7 +305,8 @@ void Axis::obey() {
     change(Event::arm);
   }
   if (asked_for(Command::rest) && mode_ == Mode::running) change(Event::stop);
-  if (asked_for(Command::trip) && (mode_ == Mode::ready || mode_ == Mode::running)) (void)trip(doubted_);
+  const bool may_drive = mode_ == Mode::ready || mode_ == Mode::running || mode_turned_ != turned(mode_);
+  if (asked_for(Command::trip) && may_drive) (void)trip(doubted_);
 }
 
 FastView Axis::fast() const {
@@ -327,7 +355,10 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
   core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
              steps_ - 1);
-  allowance_ = permitted_by(governor_.tick(core_), board);
+  const Allowance permitted = permitted_by(governor_.tick(core_), board);
+  const bool whole = built_as_it_was() && (core_.estimate().flags & thermal::model_changed) == 0;
+  allowance_ = whole ? permitted : Allowance{0.0f, wire::Limit::blind};
+  if (!whole) doubt({wire::Fault::memory_changed});
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
@@ -336,19 +367,24 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
 
 /// The tick may come in at any place: what it changed under the look is not looked at.
 void Axis::watch() {
-  if (mode_ != Mode::ready && mode_ != Mode::running) return watch_.forget();
   const std::uint32_t before = heat_.adding().periods;
   std::atomic_signal_fence(std::memory_order_seq_cst);
+  const bool whole = mode_turned_ == turned(mode_), armed = mode_ == Mode::ready || mode_ == Mode::running;
   const Watch::Look look = {trace_.phase_A, trace_.current_A, trace_.asked_V,        rotor_.electrical_rad_per_s(),
                             trace_.bus_V,   trace_.share,     mode_ == Mode::running};
   std::atomic_signal_fence(std::memory_order_seq_cst);
   if (heat_.adding().periods != before || commands_.load() != 0) return;
+  if (!whole) return doubt({wire::Fault::memory_changed});
+  if (!armed) return watch_.forget();
   const thermal::Unseen now = look.switches ? unseen_now() : thermal::Unseen{};
   looked_ = {looked_.of_mean_A2 + now.of_mean_A2, looked_.of_heat_A2 + now.of_heat_A2};
   ++looks_;
   const FaultRecord found = watch_.judge(look, {warm_ohm(), inductance_H_, flux_Wb_});
-  if (found.fault == wire::Fault::none) return;
-  doubted_ = found;
+  if (found.fault != wire::Fault::none) doubt(found);
+}
+
+void Axis::doubt(const FaultRecord& why) {
+  doubted_ = why;
   post(Command::trip);
 }
 

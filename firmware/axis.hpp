@@ -180,11 +180,15 @@ class Axis {
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
 
-  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8, trip = 16, rest = 32 };
+  // Two bits for `arm`: one that flips must not arm.
+  enum class Command : std::uint8_t { arm = 1 + 64, disarm = 2, clear = 4, configure = 8, trip = 16, rest = 32 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   void judge(const AxisSetup& setup);
   void take_over();
+  std::uint32_t built_sum() const;
+  bool built_as_it_was() const;
+  void doubt(const FaultRecord& why);
   [[gnu::noinline]] void obey();
   [[gnu::noinline]] hal::Duty unseen(const hal::AxisSample& sample, Verdict verdict);
   [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
@@ -202,7 +206,12 @@ class Axis {
   float warm_ohm() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
-  void change(Event event) { mode_ = next(mode_, event); }
+  void change(Event event) { set(next(mode_, event)); }
+  void set(Mode mode) {
+    mode_ = mode;
+    mode_turned_ = turned(mode);
+  }
+  static constexpr std::uint8_t turned(Mode mode) { return static_cast<std::uint8_t>(~static_cast<unsigned>(mode)); }
 
   // The two hand-overs between the lanes.
   HeatHandOver heat_;
@@ -249,6 +258,7 @@ class Axis {
     }
   } trace_;
   Mode mode_ = Mode::off;
+  std::uint8_t mode_turned_ = turned(Mode::off);  // a bit of either that flips would arm an axis, or clear a fault
   wire::ControlMode control_ = wire::ControlMode::current;  // of the lower context; the fast lane knows current only
   float A_per_Nm_ = unset;
   bool configured_ = false;             // the parameter set is complete and valid
@@ -273,6 +283,7 @@ class Axis {
   bool senses_housing_;
   Watch watch_;
   FaultRecord doubted_;  // why `trip` was posted
+  std::uint32_t built_ = 0;  // of what only `take_over` and the constructor write
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;
