@@ -16,6 +16,9 @@ constexpr float blind_share = 0.6f;    // of the continuous current, while no ho
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
+// Later no lane comes whose board has a watchdog: the count has flipped, and what it is shared by would seem to cool.
+constexpr int late_steps = 3;
+constexpr float most_owed_steps = 1e6f;  // beyond any lateness, and a whole number
 // Of three sensors: four times their noise, and gains apart by some percent. Half an ampere of offset is more heat by a
 // tenth where a small winding is held at its limit.
 constexpr float contradiction_A = 0.2f, contradiction_share = 0.03f;
@@ -131,8 +134,8 @@ std::uint32_t Axis::built_sum() const {
   current_loop_.add_built_to(sum);
   return sum
       .add(rating_, next_, next_state_, dead_time_, usable_ratio_, A_per_Nm_, configured_, quiet_rad_per_s_per_V_,
-           offset_bound_A_, governor_.settings(), phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_, peak_A_,
-           blind_A_, senses_housing_, period_s_, index_)
+           offset_bound_A_, control_, governor_.settings(), phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_,
+           peak_A_, blind_A_, senses_housing_, period_s_, index_)
       .word();
 }
 
@@ -250,6 +253,14 @@ hal::Duty Axis::trip(const FaultRecord& found) {
   return last_ = released;
 }
 
+/// From a mode that has flipped there is no way but this.
+void Axis::change(Event event) {
+  if (mode_turned_ == turned(mode_))
+    set(next(mode_, event));
+  else
+    (void)trip({wire::Fault::memory_changed});
+}
+
 /// What was latched behind it, by an earlier start, is next.
 void Axis::cleared() {
   fault_ = behind_;
@@ -348,10 +359,10 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   surround(neighbour_degC);
   // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
   const float came_steps = static_cast<float>(sums.periods) * period_s_ * slow_Hz;
-  owed_steps_ += came_steps;
+  owed_steps_ = std::fmin(owed_steps_ + came_steps, most_owed_steps);
   steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
   // Its heat does not wait, or it would be that of the next. A lane that comes too often is charged for whole steps.
-  charge_ = owed_steps_ < 0.5f ? 1.0f : came_steps / static_cast<float>(steps_);
+  charge_ = owed_steps_ < 0.5f || steps_ > late_steps ? 1.0f : came_steps / static_cast<float>(steps_);
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
   core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
              steps_ - 1);
@@ -445,6 +456,12 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   } else {
     unseen_ = looked;
     fill_currents(input, sums);
+    if (static_cast<float>(sums.periods) > late_steps * pwm_Hz_ / slow_Hz) {
+      for (int k = 0; k < thermal::drive_count; ++k) {
+        if (thermal::is_current_square(static_cast<thermal::Drive>(k)))
+          input.drive[k] = std::fmax(input.drive[k], input_.drive[k]);
+      }
+    }
     input[thermal::Drive::enabled] = mode_ == Mode::running ? 1.0 : 0.0;
     thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }

@@ -139,7 +139,11 @@ class Axis {
   /// What setpoints mean from now on. Only at rest, and torque only with a complete set.
   wire::Status choose(wire::ControlMode mode) {
     const wire::Status answer = against(mode);
-    if (answer == wire::Status::done) control_ = mode;
+    if (answer == wire::Status::done) {
+      const bool whole = built_as_it_was();  // or what has flipped would pass for chosen
+      control_ = mode;
+      if (whole) built_ = built_sum();
+    }
     return answer;
   }
   wire::Status against(wire::ControlMode mode) const;
@@ -206,7 +210,7 @@ class Axis {
   float warm_ohm() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
-  void change(Event event) { set(next(mode_, event)); }
+  void change(Event event);
   void set(Mode mode) {
     mode_ = mode;
     mode_turned_ = turned(mode);
@@ -282,8 +286,8 @@ class Axis {
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;
   Watch watch_;
-  FaultRecord doubted_;  // why `trip` was posted
-  std::uint32_t built_ = 0;  // of what only `take_over` and the constructor write
+  FaultRecord doubted_;      // why `trip` was posted
+  std::uint32_t built_ = 0;  // of what only the constructor, `take_over` and `choose` write
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;

@@ -2,8 +2,9 @@
 // What the fast lane hands outward: sums since the slow lane last took them, each nonlinear form taken before the sum.
 //
 // Two buffers: the fast lane adds to one, the slow lane takes the other; the turn is one word, so no sum is ever torn
-// and nothing is counted twice or lost. No pointer: one with a flipped bit would let the fast lane write anywhere. float32 carries a sum of some hundred terms to 1e-5; the state that grows for
-// minutes lives in the slow lane in double. `add` is for the control interrupt, `take` for the slow lane.
+// and nothing is counted twice or lost. No pointer: one with a flipped bit would let the fast lane write anywhere.
+// float32 carries a sum of some hundred terms to 1e-5; the state that grows for minutes lives in the slow lane in
+// double. `add` is for the control interrupt, `take` for the slow lane.
 #pragma once
 
 #include <atomic>
