@@ -155,14 +155,13 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   const Abc phase_A = offsets_.correct(sample.current_A);
   const RotorAngle rotor = rotor_.follow(sample.rotor_rad, sight.periods);
   const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample));
-  HeatSums& sums = heat_.adding();
-  add_heat(sums, phase_A, sight.periods);
+  const std::uint32_t age_periods = add_heat(phase_A, sight.periods);
   trace_.note_sample(phase_A, sample.rotor_rad, last_.ratio);
 
   setpoint_.follow(sight.periods);
   if (mode_ != Mode::running || !(setpoint_.share() > 0.0f)) return resting(sample, current_A, sight.periods);
 
-  const Permitted permitted = permit_.permit(setpoint_, allowance_, sums.periods, sample.bus_V, rotor_.rad_per_s());
+  const Permitted permitted = permit_.permit(setpoint_, allowance_, age_periods, sample.bus_V, rotor_.rad_per_s());
   const Dq error_A = {permitted.current_A.d - current_A.d, permitted.current_A.q - current_A.q};
   const Dq asked_V = current_loop_.ask(error_A, current_A, rotor_.electrical_rad_per_s());
 
@@ -179,22 +178,27 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   return last_;
 }
 
-/// Adds what one sample says; the periods that were missed before it are charged first, hotter.
-inline void Axis::add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods) {
-  if (periods != 1) add_missed(sums, periods - 1);
+/// Adds what one sample says; the periods that were missed before it are charged first, hotter. Returns how many there
+/// are now.
+inline std::uint32_t Axis::add_heat(const Abc& phase_A, std::uint32_t periods) {
+  HeatSums& sums = periods != 1 ? add_missed(periods - 1) : heat_.adding();
   sums.phase_A2.a += phase_A.a * phase_A.a;
   sums.phase_A2.b += phase_A.b * phase_A.b;
   sums.phase_A2.c += phase_A.c * phase_A.c;
-  sums.periods += 1;
+  return sums.periods += 1;
 }
 
 /// A tenth above the last current, and at its peak in every phase: nobody saw where the rotor went.
-void Axis::add_missed(HeatSums& sums, std::uint32_t missed) {
+HeatSums& Axis::add_missed(std::uint32_t missed) {
+  HeatSums& sums = heat_.adding();
   const float times = static_cast<float>(missed);
   const Dq i = trace_.current_A;
   const float hot_A2 = 1.21f * times * (i.d * i.d + i.q * i.q);
-  sums.phase_A2 = {sums.phase_A2.a + hot_A2, sums.phase_A2.b + hot_A2, sums.phase_A2.c + hot_A2};
+  sums.phase_A2.a += hot_A2;
+  sums.phase_A2.b += hot_A2;
+  sums.phase_A2.c += hot_A2;
   sums.periods += missed;
+  return sums;
 }
 
 /// No sample to work with: one period goes on as it was, the second trips if the bridge could be on. Current may flow
@@ -203,11 +207,10 @@ hal::Duty Axis::unseen(const hal::AxisSample& sample, Verdict verdict) {
   sees_ = false;
   if (verdict == Verdict::refused) {
     const Abc phase_A = offsets_.correct(sample.current_A);
-    HeatSums& sums = heat_.adding();
     if (std::isfinite(phase_A.a) && std::isfinite(phase_A.b) && std::isfinite(phase_A.c))
-      add_heat(sums, phase_A, 1);
+      (void)add_heat(phase_A, 1);
     else
-      add_missed(sums, 1);
+      (void)add_missed(1);
   }
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;

@@ -198,8 +198,8 @@ class Axis {
   [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
   void cleared();
-  void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
-  [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
+  std::uint32_t add_heat(const Abc& phase_A, std::uint32_t periods);
+  [[gnu::noinline]] HeatSums& add_missed(std::uint32_t missed);
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   void fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) const;

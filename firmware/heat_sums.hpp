@@ -21,11 +21,11 @@ struct HeatSums {
 
 class HeatHandOver {
  public:
-  HeatSums& adding() { return sums_[turn_.load(std::memory_order_relaxed) & 1u]; }
+  HeatSums& adding() { return sums_[turn_.load(std::memory_order_relaxed) / sizeof(HeatSums) % 2]; }
 
   HeatSums take() {
     HeatSums& filled = adding();
-    turn_.store(turn_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    turn_.store(turn_.load(std::memory_order_relaxed) + sizeof(HeatSums), std::memory_order_relaxed);
     std::atomic_signal_fence(std::memory_order_seq_cst);  // one core: the interrupt adds elsewhere from here on
     const HeatSums taken = filled;
     filled = {};
@@ -34,7 +34,7 @@ class HeatHandOver {
 
  private:
   HeatSums sums_[2];
-  std::atomic<std::uint32_t> turn_{0};
+  std::atomic<std::uint32_t> turn_{0};  // in bytes: where to add is then one mask away
 };
 
 }  // namespace firmware
