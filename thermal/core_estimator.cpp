@@ -70,8 +70,10 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
                                     int lost_steps) {
   if (built_sum() != built_) return give_up();
-  flags_ &= ~(input_replaced | lost_time | state_restored);
-  if (state_sum() != left_) start_hotter();
+  if (state_sum() == left_)
+    flags_ &= ~(input_replaced | lost_time | state_restored);
+  else
+    start_hotter();
   if (!take_input(input)) flags_ |= input_replaced;
   if (lost_steps > 0) {
     flags_ |= lost_time;
@@ -332,7 +334,7 @@ void CoreEstimator::raise_to(float winding_degC) {
 // ---- resets --------------------------------------------------------------------------------------------------------
 
 HeatMemory CoreEstimator::save() const {
-  HeatMemory memory{built_sum() == built_ ? n_ : 0,
+  HeatMemory memory{built_sum() == built_ && state_sum() == left_ ? n_ : 0,
                     {},
                     {},
                     static_cast<float>(ambient_degC_),
@@ -400,6 +402,10 @@ void CoreEstimator::know_housing(float sigma_K) {
 
 void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
   const HeatMemory memory = save();
+  if (memory.node_count == 0) {  // not even what is known of the sensor may be looked at
+    new (this) CoreEstimator(set, settings);
+    return start_hot();
+  }
   const HousingSensor<double> described = housing_;
   const HousingWatch record = watch_;
   const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
@@ -474,7 +480,7 @@ std::uint32_t CoreEstimator::state_sum() const {
   watch_.add_to(sum);
   return sum
       .add(degC_, ambient_degC_, sensor_degC_, due_K_, due_margin_K_, due_steps_, resumed_, doubted_K_, kept_K_,
-           remembers_, guessed_)
+           remembers_, guessed_, flags_)
       .word();
 }
 
@@ -490,7 +496,7 @@ void CoreEstimator::start_hotter() {
   const float hottest_degC = static_cast<float>(estimate_.hottest_degC());
   start_hot();
   raise_to(hottest_degC);
-  flags_ |= state_restored;
+  flags_ = state_restored;
 }
 
 /// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What

@@ -81,7 +81,7 @@ class CoreEstimator {
   /// The host knows better only upwards.
   void raise_to(float winding_degC);
 
-  /// What must survive a reset: of the last tick. Nothing, once the model has changed.
+  /// What must survive a reset: of the last tick. Nothing, once a bit has flipped.
   HeatMemory save() const;
   /// After a reset. A time off that is negative or NaN is unknown: then nothing has cooled. The ambient is at least the
   /// one believed; each winding is at least as warm as the mean of them, which they may have reached meanwhile, and as

@@ -54,8 +54,8 @@ constexpr const char* examples =
     "  faults --only F02 --seeds 20 --runs\n"
     "  faults --honest 10           hours without a fault: noise, gains apart, drift; nothing may trip\n"
     "Elsewhere: F15, F26 and the hangs of F20 are tested in tests/chip, F23 and the frames of F21 in\n"
-    "tests/usb, F29 and the other counters of F17 in tests/firmware. Of F19 (bits that flip) only words\n"
-    "that are no number, in tests/firmware, and spoilt backup memory, in tests/chip: no campaign.\n"
+    "tests/usb, F29 and the other counters of F17 in tests/firmware. F19 (bits that flip) is the program\n"
+    "flips beside this one.\n"
     "Exit codes: 0 done, 1 a promise is broken that README does not tell of (--check) or something\n"
     "tripped in vain (--honest), 2 the command line is wrong.\n";
 

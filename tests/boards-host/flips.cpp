@@ -8,9 +8,9 @@
 //   detected    an axis said so: tripped or stopped, or a flag of its estimate rose; and nothing below happened
 //   watchdog    the program hung in a tick: on the chip a watchdog opens the bridge
 //   harmful     a winding more than 3 K above its limit, or the power stage above its own; or for longer than 10 ms
-//               more than a tenth above the peak current, torque against or beyond the demand; the trip level for
-//               more than two periods; half of the torque lost without a word; a bridge still on 310 ms after the
-//               host's last word; or the program crashed
+//               more than a tenth above the peak current, torque against or beyond the demand; above the trip level
+//               for more than a period with the bridge on; half of the torque lost without a word; a bridge still on
+//               310 ms after the host's last word; or the program crashed
 //
 // The host's object stands for the chip's: its sizes are 64 bits where those of the chip are 32. A flip comes between
 // two PWM periods, so never into the middle of a tick.
@@ -66,9 +66,10 @@ constexpr int axes = firmware::axis_count;
 constexpr double most_over_K = 3, stage_max_degC = 100;    // as F19 promises; the stage's own limit
 constexpr double noticed_s = 0.010, silent_s = 0.310;      // F19; time-out, ramp and 5 ms of F21, and one tick
 constexpr double torque_share = 0.2, current_share = 1.1;  // of the largest demand, of the peak
-constexpr double lost_share = 0.5, last_s = 0.5;           // of the torque of the same run without the flip; its end
-constexpr double after_trip_s = 0.3;                       // an open bridge only cools
-constexpr long hang_us = 300'000;                          // of CPU without a period, which takes 10: it hangs
+constexpr double trip_A = static_cast<double>(boards::dual_48V_20A.trip_A), trip_s = 75e-6;
+constexpr double lost_share = 0.5, last_s = 0.5;  // of the torque of the same run without the flip; its end
+constexpr double after_trip_s = 0.3;              // an open bridge only cools
+constexpr long hang_us = 300'000;                 // of CPU without a period, which takes 10: it hangs
 
 constexpr const char* examples =
     "Examples:\n"
@@ -113,7 +114,7 @@ void look_for_a_hang(int) {
 /// Runs on for `seconds`, then without a host. `calm`: what is seen without the flip, nullptr: this is it.
 Seen watched(Stand& s, double seconds, const Seen* calm) {
   Seen seen;
-  Stretch above_peak, above_trip, wrong[axes], elsewhere[axes];
+  Stretch above_peak, above_trip[axes], wrong[axes], elsewhere[axes];
   firmware::Mode before[axes];
   for (int a = 0; a < axes; ++a) before[a] = s.arms ? firmware::Mode::running : firmware::Mode::off;
   const double dt_s = s.bench.period_s(), from_s = s.time_s();
@@ -128,9 +129,12 @@ Seen watched(Stand& s, double seconds, const Seen* calm) {
       const host_sim::AxisTruth now = s.bench.truth(a);
       const firmware::Axis& axis = s.driver->axis(a);
       seen.over_K[a] = std::max(seen.over_K[a], now.hottest_degC - s.design().truth.winding_max_degC);
-      for (const double i_A : now.current_A) most_A = std::max(most_A, std::abs(i_A));
+      double largest_A = 0;
+      for (const double i_A : now.current_A) largest_A = std::max(largest_A, std::abs(i_A));
+      most_A = std::max(most_A, largest_A);
       seen.flags[a] |= axis.state().estimate_flags;
       const firmware::Mode mode = axis.mode();
+      above_trip[a].see(largest_A > trip_A && mode == firmware::Mode::running, dt_s);
       elsewhere[a].see(mode != before[a] && mode <= firmware::Mode::tripped, dt_s);
       told = told || mode == firmware::Mode::tripped || elsewhere[a].now_s > noticed_s ||
              (calm != nullptr && (seen.flags[a] & ~calm->flags[a]) != 0);
@@ -143,7 +147,6 @@ Seen watched(Stand& s, double seconds, const Seen* calm) {
     if (told && s.host_alive && seen.told_s < 0) seen.told_s = s.time_s() - from_s;
     seen.stage_over_K = std::max(seen.stage_over_K, s.bench.power_stage_degC() - stage_max_degC);
     above_peak.see(most_A > current_share * peak_A, dt_s);
-    above_trip.see(most_A > static_cast<double>(boards::dual_48V_20A.trip_A), dt_s);
   };
   while (s.time_s() < to_s) period();
   s.host_alive = false;
@@ -157,9 +160,9 @@ Seen watched(Stand& s, double seconds, const Seen* calm) {
     seen.last_Nm[a] /= std::max(last, 1);
     seen.silent_on = seen.silent_on || s.driver->axis(a).mode() == firmware::Mode::running;
     seen.wrong_s = std::max(seen.wrong_s, wrong[a].worst_s);
+    seen.above_trip_s = std::max(seen.above_trip_s, above_trip[a].worst_s);
   }
   seen.above_peak_s = above_peak.worst_s;
-  seen.above_trip_s = above_trip.worst_s;
   return seen;
 }
 
@@ -176,7 +179,7 @@ std::string harm(const Seen& seen, const Seen& calm) {
   }
   if (seen.stage_over_K - std::max(calm.stage_over_K, 0.0) > 0)
     return fmt::format("power stage {:.1f} K over", seen.stage_over_K);
-  if (seen.above_trip_s > 2.5 * 50e-6) return fmt::format("above the trip level for {:.4f} s", seen.above_trip_s);
+  if (seen.above_trip_s > trip_s) return fmt::format("above the trip level for {:.4f} s", seen.above_trip_s);
   if (seen.above_peak_s > noticed_s) return fmt::format("above the peak for {:.3f} s", seen.above_peak_s);
   if (seen.wrong_s > noticed_s) return fmt::format("wrong torque for {:.3f} s", seen.wrong_s);
   if (seen.silent_on) return "runs on without a host";
