@@ -55,6 +55,7 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
       index_(index) {
   judge(setup);
   take_over();
+  fixed_ = fixed_sum();
   built_ = built_sum();
 }
 
@@ -124,7 +125,12 @@ void Axis::take_over() {
   if (fault_.fault == wire::Fault::parameters) cleared();
 }
 
-/// What the fast lane is built from, and the constants of the slow lane.
+/// What nobody may write after the constructor.
+std::uint32_t Axis::fixed_sum() const {
+  return thermal::FlipSum().add(rating_, governor_.settings(), peak_A_, blind_A_, index_).word();
+}
+
+/// What another set brings, and how setpoints are understood.
 std::uint32_t Axis::built_sum() const {
   thermal::FlipSum sum;
   guard_.add_built_to(sum);
@@ -133,16 +139,16 @@ std::uint32_t Axis::built_sum() const {
   permit_.add_built_to(sum);
   current_loop_.add_built_to(sum);
   return sum
-      .add(rating_, next_, next_state_, dead_time_, usable_ratio_, A_per_Nm_, configured_, quiet_rad_per_s_per_V_,
-           offset_bound_A_, control_, governor_.settings(), phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_,
-           peak_A_, blind_A_, senses_housing_, period_s_, index_)
+      .add(next_, next_state_, dead_time_, usable_ratio_, A_per_Nm_, configured_, quiet_rad_per_s_per_V_,
+           offset_bound_A_, control_, phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_, senses_housing_,
+           period_s_)
       .word();
 }
 
 /// What `configure` brought is another set until the fast lane has taken it over.
 bool Axis::built_as_it_was() const {
   const bool waits = (commands_.load() & static_cast<unsigned>(Command::configure)) != 0;
-  return waits || built_sum() == built_;
+  return fixed_sum() == fixed_ && (waits || built_sum() == built_);
 }
 
 // ---- fast lane ------------------------------------------------------------------------------------------------------
@@ -365,7 +371,8 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   owed_steps_ = std::fmin(owed_steps_ + came_steps, most_owed_steps);
   steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
   // Its heat does not wait, or it would be that of the next. A lane that comes too often is charged for whole steps.
-  charge_ = owed_steps_ < 0.5f || steps_ > late_steps ? 1.0f : came_steps / static_cast<float>(steps_);
+  charge_ = owed_steps_ < 0.5f ? 1.0f : came_steps / static_cast<float>(steps_);
+  if (steps_ > late_steps) charge_ = std::fmax(charge_, 1.0f);
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
   core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
              steps_ - 1);

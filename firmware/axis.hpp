@@ -190,6 +190,7 @@ class Axis {
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   void judge(const AxisSetup& setup);
   void take_over();
+  std::uint32_t fixed_sum() const;
   std::uint32_t built_sum() const;
   bool built_as_it_was() const;
   void doubt(const FaultRecord& why);
@@ -286,8 +287,8 @@ class Axis {
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;
   Watch watch_;
-  FaultRecord doubted_;      // why `trip` was posted
-  std::uint32_t built_ = 0;  // of what only the constructor, `take_over` and `choose` write
+  FaultRecord doubted_;              // why `trip` was posted
+  std::uint32_t fixed_, built_ = 0;  // sums of what is as the constructor, or the last set and choice, left it
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;

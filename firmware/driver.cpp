@@ -58,7 +58,7 @@ void Driver::slow_tick(const hal::BoardSlowSample& board, const hal::AxisSlowSam
                                               governor_.max_A, static_cast<float>(thermal::estimator_dt_s), governor_);
     axes_[i].slow_tick(axes[i], {whole ? board_A_[i] : 0.0f, wire::Limit::board_hot}, housings_degC[1 - i]);
   }
-  if (whole) left_ = sum();  // else no restart of a sum makes it so again
+  if (whole) left_ = sum();  // else nothing is allowed until a restart
 }
 
 }  // namespace firmware
