@@ -9,8 +9,8 @@
 //   watchdog    the program hung in a tick: on the chip a watchdog opens the bridge
 //   harmful     a winding more than 3 K above its limit, or the power stage above its own; or for longer than 10 ms
 //               more than a tenth above the peak current, torque against or beyond the demand; above the trip level
-//               for more than a period with the bridge on; half of the torque lost without a word; a bridge still on
-//               310 ms after the host's last word; or the program crashed
+//               for more than the 100 us of a saturated reading, bridge on; half of the torque lost without a word; a
+//               bridge still on 310 ms after the host's last word; or the program crashed
 //
 // The host's object stands for the chip's: its sizes are 64 bits where those of the chip are 32. A flip comes between
 // two PWM periods, so never into the middle of a tick.
@@ -66,7 +66,7 @@ constexpr int axes = firmware::axis_count;
 constexpr double most_over_K = 3, stage_max_degC = 100;    // as F19 promises; the stage's own limit
 constexpr double noticed_s = 0.010, silent_s = 0.310;      // F19; time-out, ramp and 5 ms of F21, and one tick
 constexpr double torque_share = 0.2, current_share = 1.1;  // of the largest demand, of the peak
-constexpr double trip_A = static_cast<double>(boards::dual_48V_20A.trip_A), trip_s = 75e-6;
+constexpr double trip_A = static_cast<double>(boards::dual_48V_20A.trip_A), trip_s = 125e-6;
 constexpr double lost_share = 0.5, last_s = 0.5;  // of the torque of the same run without the flip; its end
 constexpr double after_trip_s = 0.3;              // an open bridge only cools
 constexpr long hang_us = 300'000;                 // of CPU without a period, which takes 10: it hangs
