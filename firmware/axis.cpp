@@ -386,6 +386,13 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   publish();
 }
 
+/// Into what has flipped the next slow tick looks, and nobody before.
+void Axis::look_ahead() {
+  if (!core_.whole()) return;
+  if (!endurance_.whole()) new (&endurance_) thermal::Endurance(core_.network(), peak_A_);
+  endurance_.go_on(core_, 1);
+}
+
 /// The tick may come in at any place: what it changed under the look is not looked at.
 void Axis::watch() {
   const std::uint32_t before = heat_.adding().periods;

@@ -171,7 +171,7 @@ class Axis {
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
 
   /// Every 4 ms: a step of how long the load may go on. Changes nothing but what is said.
-  void look_ahead() { endurance_.go_on(core_, 1); }
+  void look_ahead();
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }

@@ -62,7 +62,7 @@ class Driver {
   float board_A_[axis_count] = {-1.0f, -1.0f};  // what it leaves each axis; negative: nothing said yet
   std::uint32_t left_ = 0;                      // sum of these three, as each call left them
   Axis axes_[axis_count];
-  int turn_ = 0;
+  unsigned turn_ = 0;
 };
 
 }  // namespace firmware

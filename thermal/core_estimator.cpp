@@ -334,7 +334,7 @@ void CoreEstimator::raise_to(float winding_degC) {
 // ---- resets --------------------------------------------------------------------------------------------------------
 
 HeatMemory CoreEstimator::save() const {
-  HeatMemory memory{built_sum() == built_ && state_sum() == left_ ? n_ : 0,
+  HeatMemory memory{whole() ? n_ : 0,
                     {},
                     {},
                     static_cast<float>(ambient_degC_),

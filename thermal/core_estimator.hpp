@@ -96,6 +96,9 @@ class CoreEstimator {
   /// one did nothing is forgotten: or one that stands still would be believed for a minute after each.
   void replace(const HeatSet<double>& set, const EstimatorSettings& settings);
 
+  /// No bit has flipped since the last call: it may be looked at.
+  bool whole() const { return built_sum() == built_ && state_sum() == left_; }
+
   const Estimate& estimate() const { return estimate_; }
   /// All that the governor adds to a node, as a sigma of it: what is doubted after a reset counts as much as k sigma.
   float counted_sigma_K(int node) const {

@@ -159,6 +159,7 @@ void Stand::period() {
   next_ = doors_[0].sample();
   if (!slow_lane_alive) return;
   if (periods_ % watch_periods == 0) driver->watch();
+  if (periods_ % watch_periods == 0) driver->look_ahead();
   if (periods_ % slow_periods == 0) {
     using boards::host::slow_sample;
     driver->slow_tick(slow_sample(bench.board_raw(), design_.sensors),

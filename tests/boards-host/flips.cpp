@@ -41,8 +41,9 @@ struct AxisProbe {
     PART(heat_), PART(allowance_), PART(commands_), PART(rating_), PART(next_), PART(next_state_), PART(finding_);
     PART(guard_), PART(offsets_), PART(rotor_), PART(setpoint_), PART(permit_), PART(current_loop_), PART(dead_time_);
     PART(usable_ratio_), PART(last_), PART(trace_), PART(mode_), PART(control_), PART(A_per_Nm_), PART(configured_);
-    PART(sees_), PART(quiet_rad_per_s_per_V_), PART(offset_bound_A_), PART(core_), PART(governor_), PART(looked_);
-    PART(looks_), PART(unseen_), PART(input_), PART(owed_steps_), PART(steps_), PART(charge_), PART(phase_ohm_);
+    PART(sees_), PART(quiet_rad_per_s_per_V_), PART(offset_bound_A_), PART(core_), PART(governor_), PART(endurance_);
+    PART(looked_), PART(looks_), PART(unseen_), PART(input_), PART(owed_steps_), PART(steps_), PART(charge_),
+        PART(phase_ohm_);
     PART(copper_per_K_), PART(flux_Wb_), PART(inductance_H_), PART(pwm_Hz_), PART(peak_A_), PART(blind_A_);
     PART(blind_cap_A_), PART(senses_housing_), PART(watch_), PART(doubted_), PART(tripped_periods_), PART(period_s_);
     PART(fault_), PART(behind_), PART(housing_measured_degC_), PART(state_), PART(index_);
