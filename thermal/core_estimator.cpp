@@ -480,7 +480,7 @@ std::uint32_t CoreEstimator::state_sum() const {
   watch_.add_to(sum);
   return sum
       .add(degC_, ambient_degC_, sensor_degC_, due_K_, due_margin_K_, due_steps_, resumed_, doubted_K_, kept_K_,
-           remembers_, guessed_, flags_)
+           remembers_, guessed_, flags_, estimate_.node_count)
       .word();
 }
 
