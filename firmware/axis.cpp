@@ -16,6 +16,9 @@ constexpr float blind_share = 0.6f;    // of the continuous current, while no ho
 constexpr float blind_slope = 0.02f;   // of the peak per slow tick: as gentle as the governor
 constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
+// Later no lane comes whose board has a watchdog: the count has flipped, and what it is shared by would seem to cool.
+constexpr int late_steps = 3;
+constexpr float most_owed_steps = 1e6f;  // beyond any lateness, and a whole number
 // Of three sensors: four times their noise, and gains apart by some percent. Half an ampere of offset is more heat by a
 // tenth where a small winding is held at its limit.
 constexpr float contradiction_A = 0.2f, contradiction_share = 0.03f;
@@ -52,6 +55,8 @@ Axis::Axis(std::uint8_t index, const AxisSetup& setup, const BoardRating& rating
       index_(index) {
   judge(setup);
   take_over();
+  fixed_ = fixed_sum();
+  built_ = built_sum();
 }
 
 void Axis::configure(const AxisSetup& setup, HeatModel heat) {
@@ -120,6 +125,32 @@ void Axis::take_over() {
   if (fault_.fault == wire::Fault::parameters) cleared();
 }
 
+/// What nobody may write after the constructor.
+std::uint32_t Axis::fixed_sum() const {
+  return thermal::FlipSum().add(rating_, governor_.settings(), peak_A_, blind_A_, index_).word();
+}
+
+/// What another set brings, and how setpoints are understood.
+std::uint32_t Axis::built_sum() const {
+  thermal::FlipSum sum;
+  guard_.add_built_to(sum);
+  rotor_.add_built_to(sum);
+  setpoint_.add_built_to(sum);
+  permit_.add_built_to(sum);
+  current_loop_.add_built_to(sum);
+  return sum
+      .add(next_, next_state_, dead_time_, usable_ratio_, A_per_Nm_, configured_, quiet_rad_per_s_per_V_,
+           offset_bound_A_, control_, phase_ohm_, copper_per_K_, flux_Wb_, inductance_H_, pwm_Hz_, senses_housing_,
+           period_s_)
+      .word();
+}
+
+/// What `configure` brought is another set until the fast lane has taken it over.
+bool Axis::built_as_it_was() const {
+  const bool waits = (commands_.load() & static_cast<unsigned>(Command::configure)) != 0;
+  return fixed_sum() == fixed_ && (waits || built_sum() == built_);
+}
+
 // ---- fast lane ------------------------------------------------------------------------------------------------------
 
 hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
@@ -130,14 +161,13 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   const Abc phase_A = offsets_.correct(sample.current_A);
   const RotorAngle rotor = rotor_.follow(sample.rotor_rad, sight.periods);
   const Dq current_A = park(clarke(phase_A), sin_cos(rotor.at_sample));
-  HeatSums& sums = heat_.adding();
-  add_heat(sums, phase_A, sight.periods);
+  const std::uint32_t age_periods = add_heat(phase_A, sight.periods);
   trace_.note_sample(phase_A, sample.rotor_rad, last_.ratio);
 
   setpoint_.follow(sight.periods);
   if (mode_ != Mode::running || !(setpoint_.share() > 0.0f)) return resting(sample, current_A, sight.periods);
 
-  const Permitted permitted = permit_.permit(setpoint_, allowance_, sums.periods, sample.bus_V, rotor_.rad_per_s());
+  const Permitted permitted = permit_.permit(setpoint_, allowance_, age_periods, sample.bus_V, rotor_.rad_per_s());
   const Dq error_A = {permitted.current_A.d - current_A.d, permitted.current_A.q - current_A.q};
   const Dq asked_V = current_loop_.ask(error_A, current_A, rotor_.electrical_rad_per_s());
 
@@ -154,22 +184,27 @@ hal::Duty Axis::tick(const hal::AxisSample& sample) noexcept {
   return last_;
 }
 
-/// Adds what one sample says; the periods that were missed before it are charged first, hotter.
-inline void Axis::add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods) {
-  if (periods != 1) add_missed(sums, periods - 1);
+/// Adds what one sample says; the periods that were missed before it are charged first, hotter. Returns how many there
+/// are now.
+inline std::uint32_t Axis::add_heat(const Abc& phase_A, std::uint32_t periods) {
+  HeatSums& sums = periods != 1 ? add_missed(periods - 1) : heat_.adding();
   sums.phase_A2.a += phase_A.a * phase_A.a;
   sums.phase_A2.b += phase_A.b * phase_A.b;
   sums.phase_A2.c += phase_A.c * phase_A.c;
-  sums.periods += 1;
+  return sums.periods += 1;
 }
 
 /// A tenth above the last current, and at its peak in every phase: nobody saw where the rotor went.
-void Axis::add_missed(HeatSums& sums, std::uint32_t missed) {
+HeatSums& Axis::add_missed(std::uint32_t missed) {
+  HeatSums& sums = heat_.adding();
   const float times = static_cast<float>(missed);
   const Dq i = trace_.current_A;
   const float hot_A2 = 1.21f * times * (i.d * i.d + i.q * i.q);
-  sums.phase_A2 = {sums.phase_A2.a + hot_A2, sums.phase_A2.b + hot_A2, sums.phase_A2.c + hot_A2};
+  sums.phase_A2.a += hot_A2;
+  sums.phase_A2.b += hot_A2;
+  sums.phase_A2.c += hot_A2;
   sums.periods += missed;
+  return sums;
 }
 
 /// No sample to work with: one period goes on as it was, the second trips if the bridge could be on. Current may flow
@@ -178,11 +213,10 @@ hal::Duty Axis::unseen(const hal::AxisSample& sample, Verdict verdict) {
   sees_ = false;
   if (verdict == Verdict::refused) {
     const Abc phase_A = offsets_.correct(sample.current_A);
-    HeatSums& sums = heat_.adding();
     if (std::isfinite(phase_A.a) && std::isfinite(phase_A.b) && std::isfinite(phase_A.c))
-      add_heat(sums, phase_A, 1);
+      (void)add_heat(phase_A, 1);
     else
-      add_missed(sums, 1);
+      (void)add_missed(1);
   }
   offsets_.restart();
   if (tripped_periods_ != forever) ++tripped_periods_;
@@ -224,8 +258,16 @@ hal::Duty Axis::trip(const FaultRecord& found) {
   fault_ = found;
   fault_.axis = index_;
   tripped_periods_ = 0;
-  change(Event::trip);
+  set(Mode::tripped);
   return last_ = released;
+}
+
+/// From a mode that has flipped there is no way but this.
+void Axis::change(Event event) {
+  if (mode_turned_ == turned(mode_))
+    set(next(mode_, event));
+  else
+    (void)trip({wire::Fault::memory_changed});
 }
 
 /// What was latched behind it, by an earlier start, is next.
@@ -267,8 +309,13 @@ wire::Status Axis::clear() {
 /// What was posted since the last tick, the safest first; conditions are looked at again, for they may have changed.
 void Axis::obey() {
   const std::uint8_t posted = commands_.exchange(0);
-  const auto asked_for = [posted](Command c) { return (posted & static_cast<std::uint8_t>(c)) != 0; };
-  if (asked_for(Command::configure)) take_over();
+  const auto asked_for = [posted](Command c) {
+    return (posted & static_cast<std::uint8_t>(c)) == static_cast<std::uint8_t>(c);
+  };
+  if (asked_for(Command::configure)) {
+    take_over();
+    built_ = built_sum();
+  }
   if (asked_for(Command::disarm)) change(Event::disarm);
   if (asked_for(Command::clear) && setpoint_.is_zero() && fault_.fault != wire::Fault::parameters) {
     if (mode_ == Mode::tripped) cleared();
@@ -278,7 +325,8 @@ void Axis::obey() {
     change(Event::arm);
   }
   if (asked_for(Command::rest) && mode_ == Mode::running) change(Event::stop);
-  if (asked_for(Command::trip) && (mode_ == Mode::ready || mode_ == Mode::running)) (void)trip(doubted_);
+  const bool may_drive = mode_ == Mode::ready || mode_ == Mode::running || mode_turned_ != turned(mode_);
+  if (asked_for(Command::trip) && may_drive) (void)trip(doubted_);
 }
 
 FastView Axis::fast() const {
@@ -320,35 +368,51 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   surround(neighbour_degC);
   // What is less than a step waits for the next, or a lane that is a little late would lose up to a third of all time.
   const float came_steps = static_cast<float>(sums.periods) * period_s_ * slow_Hz;
-  owed_steps_ += came_steps;
+  owed_steps_ = std::fmin(owed_steps_ + came_steps, most_owed_steps);
   steps_ = owed_steps_ > 1.0f ? static_cast<int>(owed_steps_ + 0.5f) : 1;
   // Its heat does not wait, or it would be that of the next. A lane that comes too often is charged for whole steps.
   charge_ = owed_steps_ < 0.5f ? 1.0f : came_steps / static_cast<float>(steps_);
+  if (steps_ > late_steps) charge_ = std::fmax(charge_, 1.0f);
   owed_steps_ = std::fmax(owed_steps_ - static_cast<float>(steps_), -0.5f);
   core_.tick(charged(input_), {sample.housing.value_degC, senses_housing_ && sample.housing.valid}, {0.0f, false},
              steps_ - 1);
-  allowance_ = permitted_by(governor_.tick(core_), board);
+  const Allowance permitted = permitted_by(governor_.tick(core_), board);
+  const bool whole = built_as_it_was() && (core_.estimate().flags & thermal::model_changed) == 0;
+  allowance_ = whole ? permitted : Allowance{0.0f, wire::Limit::blind};
+  if (!whole) doubt({wire::Fault::memory_changed});
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();
 }
 
+/// Into what has flipped the next slow tick looks, and nobody before.
+void Axis::look_ahead() {
+  if (!core_.whole()) return;
+  if (!endurance_.whole()) new (&endurance_) thermal::Endurance(core_.network(), peak_A_);
+  endurance_.go_on(core_, 1);
+}
+
 /// The tick may come in at any place: what it changed under the look is not looked at.
 void Axis::watch() {
-  if (mode_ != Mode::ready && mode_ != Mode::running) return watch_.forget();
   const std::uint32_t before = heat_.adding().periods;
   std::atomic_signal_fence(std::memory_order_seq_cst);
+  const bool whole = mode_turned_ == turned(mode_), armed = mode_ == Mode::ready || mode_ == Mode::running;
   const Watch::Look look = {trace_.phase_A, trace_.current_A, trace_.asked_V,        rotor_.electrical_rad_per_s(),
                             trace_.bus_V,   trace_.share,     mode_ == Mode::running};
   std::atomic_signal_fence(std::memory_order_seq_cst);
   if (heat_.adding().periods != before || commands_.load() != 0) return;
+  if (!whole) return doubt({wire::Fault::memory_changed});
+  if (!armed) return watch_.forget();
   const thermal::Unseen now = look.switches ? unseen_now() : thermal::Unseen{};
   looked_ = {looked_.of_mean_A2 + now.of_mean_A2, looked_.of_heat_A2 + now.of_heat_A2};
   ++looks_;
   const FaultRecord found = watch_.judge(look, {warm_ohm(), inductance_H_, flux_Wb_});
-  if (found.fault == wire::Fault::none) return;
-  doubted_ = found;
+  if (found.fault != wire::Fault::none) doubt(found);
+}
+
+void Axis::doubt(const FaultRecord& why) {
+  doubted_ = why;
   post(Command::trip);
 }
 
@@ -409,6 +473,12 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   } else {
     unseen_ = looked;
     fill_currents(input, sums);
+    if (static_cast<float>(sums.periods) > late_steps * pwm_Hz_ / slow_Hz) {
+      for (int k = 0; k < thermal::drive_count; ++k) {
+        if (thermal::is_current_square(static_cast<thermal::Drive>(k)))
+          input.drive[k] = std::fmax(input.drive[k], input_.drive[k]);
+      }
+    }
     input[thermal::Drive::enabled] = mode_ == Mode::running ? 1.0 : 0.0;
     thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
   }

@@ -139,7 +139,11 @@ class Axis {
   /// What setpoints mean from now on. Only at rest, and torque only with a complete set.
   wire::Status choose(wire::ControlMode mode) {
     const wire::Status answer = against(mode);
-    if (answer == wire::Status::done) control_ = mode;
+    if (answer == wire::Status::done) {
+      const bool whole = built_as_it_was();  // or what has flipped would pass for chosen
+      control_ = mode;
+      if (whole) built_ = built_sum();
+    }
     return answer;
   }
   wire::Status against(wire::ControlMode mode) const;
@@ -167,7 +171,7 @@ class Axis {
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
 
   /// Every 4 ms: a step of how long the load may go on. Changes nothing but what is said.
-  void look_ahead() { endurance_.go_on(core_, 1); }
+  void look_ahead();
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
@@ -180,18 +184,23 @@ class Axis {
  private:
   friend struct AxisProbe;  // tests damage what no sample can reach
 
-  enum class Command : std::uint8_t { arm = 1, disarm = 2, clear = 4, configure = 8, trip = 16, rest = 32 };
+  // Two bits for `arm`: one that flips must not arm.
+  enum class Command : std::uint8_t { arm = 1 + 64, disarm = 2, clear = 4, configure = 8, trip = 16, rest = 32 };
 
   void post(Command command) { commands_.fetch_or(static_cast<std::uint8_t>(command)); }
   void judge(const AxisSetup& setup);
   void take_over();
+  std::uint32_t fixed_sum() const;
+  std::uint32_t built_sum() const;
+  bool built_as_it_was() const;
+  void doubt(const FaultRecord& why);
   [[gnu::noinline]] void obey();
   [[gnu::noinline]] hal::Duty unseen(const hal::AxisSample& sample, Verdict verdict);
   [[gnu::noinline]] hal::Duty resting(const hal::AxisSample& sample, Dq current_A, std::uint32_t periods);
   [[gnu::noinline]] hal::Duty trip(const FaultRecord& found);
   void cleared();
-  void add_heat(HeatSums& sums, const Abc& phase_A, std::uint32_t periods);
-  [[gnu::noinline]] void add_missed(HeatSums& sums, std::uint32_t missed);
+  std::uint32_t add_heat(const Abc& phase_A, std::uint32_t periods);
+  [[gnu::noinline]] HeatSums& add_missed(std::uint32_t missed);
   void add_contradicted(float (&phase_A2)[3]) const;
   thermal::HeatInput<> heat_input(const HeatSums& sums);
   void fill_currents(thermal::HeatInput<>& input, const HeatSums& sums) const;
@@ -202,7 +211,12 @@ class Axis {
   float warm_ohm() const;
   Allowance permitted_by(const thermal::Allowance& core, const Allowance& board);
   void publish();
-  void change(Event event) { mode_ = next(mode_, event); }
+  void change(Event event);
+  void set(Mode mode) {
+    mode_ = mode;
+    mode_turned_ = turned(mode);
+  }
+  static constexpr std::uint8_t turned(Mode mode) { return static_cast<std::uint8_t>(~static_cast<unsigned>(mode)); }
 
   // The two hand-overs between the lanes.
   HeatHandOver heat_;
@@ -249,6 +263,7 @@ class Axis {
     }
   } trace_;
   Mode mode_ = Mode::off;
+  std::uint8_t mode_turned_ = turned(Mode::off);  // a bit of either that flips would arm an axis, or clear a fault
   wire::ControlMode control_ = wire::ControlMode::current;  // of the lower context; the fast lane knows current only
   float A_per_Nm_ = unset;
   bool configured_ = false;             // the parameter set is complete and valid
@@ -272,7 +287,8 @@ class Axis {
   float blind_cap_A_;       // and what it leaves now
   bool senses_housing_;
   Watch watch_;
-  FaultRecord doubted_;  // why `trip` was posted
+  FaultRecord doubted_;              // why `trip` was posted
+  std::uint32_t fixed_, built_ = 0;  // sums of what is as the constructor, or the last set and choice, left it
 
   // Outward.
   std::uint32_t tripped_periods_ = 0;

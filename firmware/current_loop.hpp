@@ -10,6 +10,7 @@
 
 #include "firmware/axis_parameters.hpp"
 #include "firmware/transforms.hpp"
+#include "thermal/flip_sum.hpp"
 
 namespace firmware {
 
@@ -40,6 +41,11 @@ class CurrentLoop {
     const float missing = 1.0f - share;
     integral_V_.d += ki_V_per_A_ * error_A.d - missing * relief_d_ * asked_V.d;
     integral_V_.q += ki_V_per_A_ * error_A.q - missing * relief_q_ * asked_V.q;
+  }
+
+  void add_built_to(thermal::FlipSum& sum) const {
+    sum.add(inductance_d_H_, inductance_q_H_, flux_linkage_Wb_, kp_d_V_per_A_, kp_q_V_per_A_, ki_V_per_A_, relief_d_,
+            relief_q_);
   }
 
  private:

@@ -55,11 +55,14 @@ class Driver {
   const thermal::BoardHeat& board_heat() const { return board_heat_; }
 
  private:
+  std::uint32_t sum() const;
+
   thermal::GovernorSettings governor_;
   thermal::BoardHeat board_heat_;
   float board_A_[axis_count] = {-1.0f, -1.0f};  // what it leaves each axis; negative: nothing said yet
+  std::uint32_t left_ = 0;                      // sum of these three, as each call left them
   Axis axes_[axis_count];
-  int turn_ = 0;
+  unsigned turn_ = 0;
 };
 
 }  // namespace firmware

@@ -11,6 +11,7 @@
 #include "firmware/bits.hpp"
 #include "firmware/board_rating.hpp"
 #include "hal/axis_port.hpp"
+#include "thermal/flip_sum.hpp"
 #include "wire/codes.hpp"
 
 namespace firmware {
@@ -66,6 +67,8 @@ class Guard {
 
   /// What the last refusal was about.
   const FaultRecord& found() const { return found_; }
+
+  void add_built_to(thermal::FlipSum& sum) const { sum.add(trip_A_, bus_V_, bus_min_V_, bus_max_V_, period_s_); }
 
  private:
   [[gnu::noinline]] Sight judge(const hal::AxisSample& s, std::uint32_t periods);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What the fast lane hands outward: sums since the slow lane last took them, each nonlinear form taken before the sum.
 //
-// Two buffers: the fast lane adds to one, the slow lane takes the other; the flip is one word, so no sum is ever torn
-// and nothing is counted twice or lost. float32 carries a sum of some hundred terms to 1e-5; the state that grows for
-// minutes lives in the slow lane in double. `add` is for the control interrupt, `take` for the slow lane.
+// Two buffers: the fast lane adds to one, the slow lane takes the other; the turn is one word, so no sum is ever torn
+// and nothing is counted twice or lost. No pointer: one with a flipped bit would let the fast lane write anywhere.
+// float32 carries a sum of some hundred terms to 1e-5; the state that grows for minutes lives in the slow lane in
+// double. `add` is for the control interrupt, `take` for the slow lane.
 #pragma once
 
 #include <atomic>
@@ -20,11 +21,11 @@ struct HeatSums {
 
 class HeatHandOver {
  public:
-  HeatSums& adding() { return *adding_.load(std::memory_order_relaxed); }
+  HeatSums& adding() { return sums_[turn_.load(std::memory_order_relaxed) / sizeof(HeatSums) % 2]; }
 
   HeatSums take() {
     HeatSums& filled = adding();
-    adding_.store(&filled == &sums_[0] ? &sums_[1] : &sums_[0], std::memory_order_relaxed);
+    turn_.store(turn_.load(std::memory_order_relaxed) + sizeof(HeatSums), std::memory_order_relaxed);
     std::atomic_signal_fence(std::memory_order_seq_cst);  // one core: the interrupt adds elsewhere from here on
     const HeatSums taken = filled;
     filled = {};
@@ -33,7 +34,7 @@ class HeatHandOver {
 
  private:
   HeatSums sums_[2];
-  std::atomic<HeatSums*> adding_{&sums_[0]};
+  std::atomic<std::uint32_t> turn_{0};  // in bytes: where to add is then one mask away
 };
 
 }  // namespace firmware

@@ -14,6 +14,7 @@
 #include "firmware/bits.hpp"
 #include "firmware/setpoint.hpp"
 #include "firmware/transforms.hpp"
+#include "thermal/flip_sum.hpp"
 #include "wire/codes.hpp"
 
 namespace firmware {
@@ -72,6 +73,11 @@ class Permit {
       return {wish_A, asked.share() < 1.0f ? wire::Limit::setpoint_old : wire::Limit::none};
     const float scale = limit_A / std::sqrt(wish_A2);
     return {{wish_A.d * scale, wish_A.q * scale}, reason};
+  }
+
+  void add_built_to(thermal::FlipSum& sum) const {
+    sum.add(most_A_, most_reason_, late_A_, sound_A_, easy_bus_V_, patience_periods_, high_end_V_, high_A_per_V_,
+            low_end_V_, low_A_per_V_);
   }
 
  private:

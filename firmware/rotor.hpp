@@ -15,6 +15,7 @@
 #include "firmware/bits.hpp"
 #include "firmware/transforms.hpp"
 #include "hal/axis_port.hpp"
+#include "thermal/flip_sum.hpp"
 
 namespace firmware {
 
@@ -69,6 +70,11 @@ class Rotor {
   }
   const float& rad_per_s() const { return rad_per_s_; }  // mechanical
   float electrical_rad_per_s() const { return rad_per_s_ * electrical_per_mechanical_; }
+
+  void add_built_to(thermal::FlipSum& sum) const {
+    sum.add(pole_pairs_, electrical_per_mechanical_, offset_, angle_gain_, speed_gain_, turn32_per_speed_,
+            ahead_per_speed_, max_rad_per_s_);
+  }
 
  private:
   static constexpr float rad_per_turn32 = 2.0f * pi / 4294967296.0f;

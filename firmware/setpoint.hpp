@@ -11,6 +11,7 @@
 
 #include "firmware/axis_parameters.hpp"
 #include "firmware/transforms.hpp"
+#include "thermal/flip_sum.hpp"
 #include "wire/codes.hpp"
 
 namespace firmware {
@@ -63,6 +64,8 @@ class Setpoint {
     const Dq& last_A = slots_[serial_.load(std::memory_order_relaxed) & 1];
     return last_A.d == 0.0f && last_A.q == 0.0f;
   }
+
+  void add_built_to(thermal::FlipSum& sum) const { sum.add(timeout_periods_, fade_per_period_); }
 
  private:
   static bool within(float x_A) { return x_A >= -largest_setpoint_A && x_A <= largest_setpoint_A; }

@@ -66,6 +66,8 @@ class BoardHeat {
     used_A2_ = static_cast<double>(limit_A2_) * (ratio >= 0.0f && ratio < most ? static_cast<double>(ratio) : 1.0);
   }
 
+  void add_to(FlipSum& sum) const { sum.add(rating_, limit_A2_, share_, used_A2_, ahead_A2_, heard_); }
+
  private:
   /// The first reading counts at once: nobody knows how warm the stage was when the model began.
   void hear(Reading power_stage, int steps) {

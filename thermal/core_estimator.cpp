@@ -30,7 +30,7 @@ bool plausible(double degC) { return degC > coldest_degC && degC < hottest_possi
 template <class T>
 T hottest(const Estimate& estimate, const T (&degC)[max_nodes]) {
   T hottest = -std::numeric_limits<T>::infinity();
-  for (int i = 0; i < estimate.node_count; ++i) {
+  for (int i = 0; i < estimate.node_count && i < max_nodes; ++i) {  // it may be looked at after a flip
     if (std::isfinite(estimate.max_degC[i]) && !(degC[i] <= hottest)) hottest = degC[i];
   }
   return hottest;
@@ -61,6 +61,7 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
   kept_K_.setZero(uncertainty_.size());
   settle_sensor();
   uncertainty_.soak();
+  built_ = built_sum();
   publish();
 }
 
@@ -68,7 +69,11 @@ CoreEstimator::CoreEstimator(const HeatSet<double>& set, const EstimatorSettings
 
 const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, Reading measured_ambient,
                                     int lost_steps) {
-  flags_ &= ~(input_replaced | lost_time | state_restored);
+  if (built_sum() != built_) return give_up();
+  if (state_sum() == left_)
+    flags_ &= ~(input_replaced | lost_time | state_restored);
+  else
+    start_hotter();
   if (!take_input(input)) flags_ |= input_replaced;
   if (lost_steps > 0) {
     flags_ |= lost_time;
@@ -329,13 +334,13 @@ void CoreEstimator::raise_to(float winding_degC) {
 // ---- resets --------------------------------------------------------------------------------------------------------
 
 HeatMemory CoreEstimator::save() const {
-  HeatMemory memory{n_,
+  HeatMemory memory{whole() ? n_ : 0,
                     {},
                     {},
                     static_cast<float>(ambient_degC_),
                     watch_.contradicts() ? 1u : 0u,
                     std::fmax(static_cast<float>(uncertainty_.late_K()), 0.0f)};
-  for (int i = 0; i < n_; ++i) {
+  for (int i = 0; i < memory.node_count; ++i) {
     // What is due now is so later, and what is doubted not proven.
     memory.degC[i] = static_cast<float>(degC_[i]) + std::fmax(due_K_[i], 0.0f) + std::fmax(doubted_K_[i], 0.0f);
     memory.sigma_K[i] = estimate_.sigma_K[i];
@@ -397,6 +402,10 @@ void CoreEstimator::know_housing(float sigma_K) {
 
 void CoreEstimator::replace(const HeatSet<double>& set, const EstimatorSettings& settings) {
   const HeatMemory memory = save();
+  if (memory.node_count == 0) {  // not even what is known of the sensor may be looked at
+    new (this) CoreEstimator(set, settings);
+    return start_hot();
+  }
   const HousingSensor<double> described = housing_;
   const HousingWatch record = watch_;
   const float doubted_K = std::fmax(doubted_K_[housing_.node], 0.0f);
@@ -428,6 +437,7 @@ void CoreEstimator::start_hot() {
     s = settings_.margin_sigmas > 0.0f ? unknown_below_K / settings_.margin_sigmas : start_sigma_K;
   begin_anew(sigma_K);
   guessed_ = true;
+  publish();
 }
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
@@ -454,6 +464,40 @@ void CoreEstimator::begin_anew(const float (&sigma_K)[max_nodes]) {
 }
 
 // ---- state ---------------------------------------------------------------------------------------------------------
+
+std::uint32_t CoreEstimator::built_sum() const {
+  FlipSum sum;
+  network_.add_to(sum);
+  uncertainty_.add_built_to(sum);
+  sum.add(transition_.phi0, transition_.phi1, transition_.phi2, settings_, housing_.node, housing_.lag_s,
+          housing_.offset_K, housing_.gain_error, n_, limited_nodes_);
+  return sum.add_first(n_, max_degC_).word();
+}
+
+std::uint32_t CoreEstimator::state_sum() const {
+  FlipSum sum;
+  uncertainty_.add_state_to(sum);
+  watch_.add_to(sum);
+  return sum
+      .add(degC_, ambient_degC_, sensor_degC_, due_K_, due_margin_K_, due_steps_, resumed_, doubted_K_, kept_K_,
+           remembers_, guessed_, flags_, estimate_.node_count)
+      .word();
+}
+
+/// With another model nothing can be said of the state. The estimate stays as it was but for what it allows.
+const Estimate& CoreEstimator::give_up() {
+  for (float& margin_degC : estimate_.margin_degC) margin_degC = std::numeric_limits<float>::infinity();
+  estimate_.flags |= model_changed;
+  return estimate_;
+}
+
+/// Nobody knows which bit of the state it was, but what was published with it is whole: only one flips at a time.
+void CoreEstimator::start_hotter() {
+  const float hottest_degC = static_cast<float>(estimate_.hottest_degC());
+  start_hot();
+  raise_to(hottest_degC);
+  flags_ = state_restored;
+}
 
 /// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What
 /// has a limit and was not too cold may have been as hot as it seemed: it is at its limit at least.
@@ -500,6 +544,7 @@ void CoreEstimator::publish() {
   estimate_.flags = flags_;
   if (watch_.missing()) estimate_.flags |= housing_missing;
   if (watch_.contradicts()) estimate_.flags |= housing_contradicts;
+  left_ = state_sum();
 }
 
 }  // namespace thermal

@@ -33,8 +33,10 @@ enum EstimateFlag : std::uint32_t {
   housing_contradicts = 1u << 1,  // colder than the model can believe: ignored until it agrees again
   input_replaced = 1u << 2,       // a drive was not finite or negative: something hotter was taken
   lost_time = 1u << 3,            // this call stood for more than one step
-  state_restored = 1u << 4,       // the state was not finite: last good one, 10 K hotter, for this call no allowance
+  state_restored = 1u << 4,       // the state was not finite: last good one, 10 K hotter, for this call no allowance;
+                                  // or a bit of it had flipped since the last call: as start_hot, and no colder
   winding_ohm_refused = 1u << 5,  // the last resistance reading was implausible
+  model_changed = 1u << 6,        // a bit of what it is built from has flipped: no allowance until it is replaced
 };
 
 struct Estimate {
@@ -79,7 +81,7 @@ class CoreEstimator {
   /// The host knows better only upwards.
   void raise_to(float winding_degC);
 
-  /// What must survive a reset: of the last tick.
+  /// What must survive a reset: of the last tick. Nothing, once a bit has flipped.
   HeatMemory save() const;
   /// After a reset. A time off that is negative or NaN is unknown: then nothing has cooled. The ambient is at least the
   /// one believed; each winding is at least as warm as the mean of them, which they may have reached meanwhile, and as
@@ -93,6 +95,9 @@ class CoreEstimator {
   /// Another model takes over at once, as by restore(save(), 0) of a new one. Of a sensor that it describes as the last
   /// one did nothing is forgotten: or one that stands still would be believed for a minute after each.
   void replace(const HeatSet<double>& set, const EstimatorSettings& settings);
+
+  /// No bit has flipped since the last call: it may be looked at.
+  bool whole() const { return built_sum() == built_ && state_sum() == left_; }
 
   const Estimate& estimate() const { return estimate_; }
   /// All that the governor adds to a node, as a sigma of it: what is doubted after a reset counts as much as k sigma.
@@ -147,6 +152,10 @@ class CoreEstimator {
   void know_housing(float sigma_K);
   double lowest_limit_degC() const;
 
+  std::uint32_t built_sum() const;
+  std::uint32_t state_sum() const;
+  const Estimate& give_up();
+  void start_hotter();
   void guard_state();
   void publish();
   float due_above_K(int node) const { return due_margin_K_[node] > 0.0f ? due_margin_K_[node] : 0.0f; }
@@ -182,6 +191,8 @@ class CoreEstimator {
 
   std::uint32_t flags_ = 0;
   Estimate estimate_{};
+  // A flipped bit is found before it is used: of what does not change, and of the state as each call left it.
+  std::uint32_t built_, left_ = 0;
 };
 
 }  // namespace thermal

@@ -10,6 +10,7 @@
 // with a reading is the estimator's. No heap; same cost every call. Not for an ISR.
 #pragma once
 
+#include "thermal/flip_sum.hpp"
 #include "thermal/heat_set.hpp"
 
 namespace thermal {
@@ -79,6 +80,12 @@ class HousingWatch {
   bool contradicts() const { return contradicts_; }
   /// A memory says so. Or a reset would have it believed without limit, as a first reading is.
   void disbelieve() { contradicts_ = true; }
+
+  void add_to(FlipSum& sum) const {
+    sum.add(missing_, contradicts_, silent_steps_, steps_since_full_, window_, reading_sum_degC_, model_sum_degC_,
+            read_, housing_known_, met_, model_degC_, model_moved_K_, reading_slow_degC_, reading_moved_K_, pulled_K_,
+            trusted_ambient_degC_, hotter_K_);
+  }
 
  private:
   bool missing_ = false, contradicts_ = false;

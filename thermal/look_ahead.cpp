@@ -209,7 +209,16 @@ bool ProfileRun::go_on(const CoreEstimator& core, int most_steps) {
 }
 
 Endurance::Endurance(const HeatNetwork<double>& network, float max_A)
-    : coarse_(network.transition(0.25)), max_A_(max_A) {}
+    : coarse_(network.transition(0.25)), max_A_(max_A), left_(sum()) {}
+
+std::uint32_t Endurance::sum() const {
+  const Forecast& found = walk_.forecast;
+  return FlipSum()
+      .add(coarse_.phi0, coarse_.phi1, coarse_.phi2, coarse_.dt_s, max_A_, sum_, slices_, shares_, walk_.degC,
+           walk_.began_degC, walk_.growth, walk_.heard_node, walk_.time_s, found.feasible, found.peak_degC,
+           found.limits_after_s, piece_, good_A_, bad_A_, walking_, seconds_left_, current_A_)
+      .word();
+}
 
 void Endurance::begin(const CoreEstimator& core) {
   if (piece_.seconds == longest_s) {
@@ -250,6 +259,7 @@ void Endurance::go_on(const CoreEstimator& core, int steps) {
     if (walk_.forecast.feasible) step_walk(walk_, core, t, future_input(core, piece_.current_A, shares_), left_s);
     if (left_s <= t.dt_s || !walk_.forecast.feasible) answer();
   }
+  left_ = sum();
 }
 
 }  // namespace thermal

@@ -112,7 +112,11 @@ class Endurance {
   /// Largest |i| for ahead_s, A, to 1 % of max_A on the safe side. It lies on the phases as the load does.
   float current_A() const { return current_A_; }
 
+  /// No bit has flipped since the last call.
+  bool whole() const { return sum() == left_; }
+
  private:
+  std::uint32_t sum() const;
   void begin(const CoreEstimator& core);
   void answer();
 
@@ -126,6 +130,7 @@ class Endurance {
   float good_A_ = 0.0f, bad_A_ = 0.0f;  // that lies between them
   bool walking_ = false;
   float seconds_left_ = 0.0f, current_A_ = 0.0f;
+  std::uint32_t left_;
 };
 
 }  // namespace thermal

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "thermal/flip_sum.hpp"
 #include "thermal/heat_set.hpp"
 #include "thermal/validate.hpp"
 
@@ -183,6 +184,16 @@ class HeatNetwork {
         rate += (sources_[i].base + sources_[i].slope * degC) * input.drive[sources_[i].drive];
     }
     return rate * capacity_J_per_K_[node];
+  }
+
+  void add_to(FlipSum& sum) const {
+    sum.add(n_, source_count_, boundary_count_, curved_count_, sloped_count_, a_);
+    sum.add_first(sloped_count_, sloped_).add_first(n_, capacity_J_per_K_);
+    sum.add_first(source_count_, sources_).add_first(boundary_count_, boundaries_);
+    for (int i = 0; i < curved_count_ && i < max_links; ++i) {
+      const Link<Scalar>& link = curved_[i];
+      sum.add(link.from, link.to, link.law, link.conductance_W_per_K, link.k);
+    }
   }
 
  private:

@@ -91,6 +91,13 @@ class Uncertainty {
   double late_K() const { return late_K_; }
   void set_late_K(double late_K) { late_K_ = late_K; }
 
+  void add_built_to(FlipSum& sum) const {
+    sum.add(n_, housing_.node, housing_.lag_s, housing_.offset_K, housing_.gain_error, trust_, ambient_sigma_K_,
+            late_share_);
+    sum.add_first(max_nodes, has_limit_);
+  }
+  void add_state_to(FlipSum& sum) const { sum.add(p_, late_shared_K_, late_K_); }
+
  private:
   int power() const { return n_ + 2; }
   int inner() const { return n_ + 3; }

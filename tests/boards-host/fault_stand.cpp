@@ -7,11 +7,14 @@
 
 #include "boards/dual_48v_20a.hpp"
 #include "thermal/motor_set.hpp"
+#include "wire/pc/motor_file.hpp"
 
 namespace faults {
 namespace {
 
+using boards::host::Demand;
 using boards::host::demand_A;
+using boards::host::Shaft;
 
 constexpr long setpoint_periods = 20;  // the robot's computer speaks every millisecond
 constexpr long watch_periods = 20, slow_periods = 200;
@@ -37,6 +40,34 @@ firmware::DriverSetup setup(const Design& design) {
 }
 
 }  // namespace
+
+const char* name_of(Scenes scene) { return scene == push ? "push" : scene == stall ? "stall" : "walk"; }
+
+Design design_of(const std::string& motor, Scenes scene, double seconds, host_sim::Random& random) {
+  Design d;
+  d.truth = wire::pc::read_motor(motor, HOTCORE_SOURCE_DIR "/boards/motors").motor;
+  boards::host::Scene& s = d.scene;
+  s.seconds = seconds;
+  s.start_degC = scene == walk || motor != motors[0] ? 125 : 25;
+  s.demands = {{.from_s = 0.1, .to_s = 1e6, .current_A = peak_A}};
+  s.shaft.kind = scene == stall ? Shaft::Kind::locked : Shaft::Kind::imposed;
+  s.shaft.angle_rad = random.uniform(0, 2 * std::numbers::pi);
+  if (scene == push) s.shaft.speed_rad_per_s = random.uniform(200, 800);
+  if (scene == walk) {
+    s.shaft.speed_amplitude_rad_per_s = 600;
+    s.shaft.frequency_Hz = 1.4;
+    Demand gait{.from_s = 0.1, .to_s = 1e6, .current_A = 5, .ripple_ratio = 0.8, .frequency_Hz = 1.4};
+    s.demands = {gait, gait};
+    s.demands[1].axis = 1, s.demands[1].current_A = 3;
+  }
+  d.fault_s = random.uniform(0.3, 1.3);
+  return d;
+}
+
+void tell_the_truth(Design& d) {
+  d.known = host_sim::true_sheet(d.truth, host_sim::heat_from_sheet(d.truth));
+  d.estimator.trust = thermal::exact_trust;
+}
 
 Stand::Stand(const Design& design, std::uint64_t seed)
     : bench(plant(design), seed),
@@ -100,7 +131,7 @@ double Stand::phase_missed_A() const {
 void Stand::speak(int axis) {
   firmware::Axis& spoken_to = driver->axis(axis);
   if (time_s() < 0) return;
-  if (!armed_[axis]) {
+  if (!armed_[axis] && arms) {
     armed_[axis] = spoken_to.arm() == wire::Status::done;
     return;
   }
@@ -128,6 +159,7 @@ void Stand::period() {
   next_ = doors_[0].sample();
   if (!slow_lane_alive) return;
   if (periods_ % watch_periods == 0) driver->watch();
+  if (periods_ % watch_periods == 0) driver->look_ahead();
   if (periods_ % slow_periods == 0) {
     using boards::host::slow_sample;
     driver->slow_tick(slow_sample(bench.board_raw(), design_.sensors),
@@ -135,17 +167,24 @@ void Stand::period() {
   }
 }
 
-double Stand::largest_demand_Nm() const {
+void Stand::step() {
+  if (host_alive && periods_ % setpoint_periods == 0) {
+    for (int axis = 0; axis < boards::host::axes_of(design_.scene); ++axis) speak(axis);
+  }
+  period();
+}
+
+double Stand::largest_demand_Nm(int axis) const {
   double most_A = 0;
   for (const boards::host::Demand& d : design_.scene.demands) {
-    if (d.axis == 0) most_A = std::max(most_A, std::abs(d.current_A) * (1 + d.ripple_ratio));
+    if (d.axis == axis) most_A = std::max(most_A, std::abs(d.current_A) * (1 + d.ripple_ratio));
   }
   return 1.5 * design_.truth.pole_pairs * design_.truth.flux_linkage_Wb * most_A;
 }
 
 Stand::Outcome Stand::play(const std::function<void(Stand&)>& fault, const Watch& evident, const Watch& reacted) {
   Outcome out;
-  const double whole_Nm = largest_demand_Nm();
+  const double whole_Nm = largest_demand_Nm(0);
   double end_s = design_.scene.seconds;
   bool broken = false;
   while (time_s() < end_s) {
@@ -154,10 +193,7 @@ Stand::Outcome Stand::play(const std::function<void(Stand&)>& fault, const Watch
       if (fault) fault(*this);
     }
     if (broken && each) each();
-    if (host_alive && periods_ % setpoint_periods == 0) {
-      for (int axis = 0; axis < boards::host::axes_of(design_.scene); ++axis) speak(axis);
-    }
-    period();
+    step();
     if (!broken) continue;
 
     const host_sim::AxisTruth now = truth();

@@ -29,6 +29,16 @@ struct Design {
   std::uint32_t first_period = 0;  // the number of the first PWM period
 };
 
+enum Scenes : unsigned { push = 1, stall = 2, walk = 4, all = 7 };
+const char* name_of(Scenes scene);  // of one
+inline constexpr const char* motors[] = {"ec-16-40w", "ec-powermax-30-48v", "ec-powermax-30-24v"};
+inline constexpr double peak_A = 20;  // the board's
+
+/// What a scene asks of a motor; a large one is warm already, or the push would not last. The firmware is not told yet.
+Design design_of(const std::string& motor, Scenes scene, double seconds, host_sim::Random& random);
+/// The firmware knows the motor.
+void tell_the_truth(Design& design);
+
 class Stand {
  public:
   using Watch = std::function<bool(const Stand&)>;
@@ -42,7 +52,7 @@ class Stand {
   std::function<void()> each;                     // before each period, from the fault on
   std::function<double(double demand_A)> turned;  // what becomes of the demand
   double skipped_ticks = 0;                       // share of control interrupts that do not happen, of both axes
-  bool ticks_twice = false, slow_lane_alive = true, host_alive = true;
+  bool ticks_twice = false, slow_lane_alive = true, host_alive = true, arms = true;
 
   void breaks(host_sim::Channel channel, host_sim::FaultKind kind, double value = 0,
               host_sim::Channel other = host_sim::Channel::current_a, int other_axis = 0);
@@ -59,6 +69,7 @@ class Stand {
   double worst_current_error_A() const;        // of a phase's reading
   double angle_error_rad() const;              // of the encoder, electrical
   double phase_missed_A() const;               // the most that was permitted for a phase in which nothing flows
+  double largest_demand_Nm(int axis) const;
   double short_A() const { return std::abs(bench.bridge(0).short_A()); }  // between two leads
 
   struct Outcome {
@@ -70,6 +81,8 @@ class Stand {
     double wrong_way = 0;                   // torque against what is asked for, in what the largest demand makes
     double stage_over_K = -1e9, bus_V = 0;
   };
+  /// One PWM period, and what the host says before it.
+  void step();
   /// `evident`: the samples show it; `reacted`: besides a trip. Looked at each period from the fault on; all worst
   /// values are from there on.
   Outcome play(const std::function<void(Stand&)>& fault, const Watch& evident, const Watch& reacted);
@@ -77,7 +90,6 @@ class Stand {
  private:
   void period();
   void speak(int axis);
-  double largest_demand_Nm() const;
 
   Design design_;
   boards::host::AxisDoor doors_[2];

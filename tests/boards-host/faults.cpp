@@ -20,7 +20,6 @@
 #include "tests/boards-host/fault_stand.hpp"
 #include "tests/identify/chance.hpp"
 #include "wire/pc/help.hpp"
-#include "wire/pc/motor_file.hpp"
 #include "wire/pc/program.hpp"
 
 namespace firmware {
@@ -37,21 +36,17 @@ struct AxisProbe {
 
 namespace {
 
-using boards::host::Demand;
 using boards::host::Shaft;
-using faults::Design;
-using faults::Stand;
+using namespace faults;
 using host_sim::Channel;
 using host_sim::FaultKind;
 using host_sim::Random;
 using wire::Limit;
 
-const std::string root = HOTCORE_SOURCE_DIR;
 constexpr double never = std::numeric_limits<double>::infinity(), ms = 1e-3, pi = std::numbers::pi;
 constexpr double period_s = 50e-6;
 constexpr double shown_A = 2, shown_share = 0.1, shown_rad = pi / 6;
 constexpr double reduced_A = 0.6 * 6;  // R2: of the board's continuous current
-constexpr double peak_A = 20;          // the board's
 
 constexpr const char* examples =
     "Examples:\n"
@@ -59,12 +54,10 @@ constexpr const char* examples =
     "  faults --only F02 --seeds 20 --runs\n"
     "  faults --honest 10           hours without a fault: noise, gains apart, drift; nothing may trip\n"
     "Elsewhere: F15, F26 and the hangs of F20 are tested in tests/chip, F23 and the frames of F21 in\n"
-    "tests/usb, F29 and the other counters of F17 in tests/firmware. Of F19 (bits that flip) only words\n"
-    "that are no number, in tests/firmware, and spoilt backup memory, in tests/chip: no campaign.\n"
+    "tests/usb, F29 and the other counters of F17 in tests/firmware. F19 (bits that flip) is the program\n"
+    "flips beside this one.\n"
     "Exit codes: 0 done, 1 a promise is broken that README does not tell of (--check) or something\n"
     "tripped in vain (--honest), 2 the command line is wrong.\n";
-
-enum Scenes : unsigned { push = 1, stall = 2, walk = 4, all = 7 };
 
 /// One fault, what was promised for it, and where that is not kept, why, and what the check holds instead.
 struct Row {
@@ -339,38 +332,14 @@ std::vector<Row> table() {
   return rows;
 }
 
-/// What a scene asks of a motor; a large one is warm already, or the push would not last.
-Design design_of(const std::string& motor, Scenes scene, double seconds, Random& random) {
-  Design d;
-  d.truth = wire::pc::read_motor(motor, root + "/boards/motors").motor;
-  boards::host::Scene& s = d.scene;
-  s.seconds = seconds;
-  s.start_degC = scene == walk || motor != "ec-16-40w" ? 125 : 25;
-  s.demands = {{.from_s = 0.1, .to_s = 1e6, .current_A = peak_A}};
-  s.shaft.kind = scene == stall ? Shaft::Kind::locked : Shaft::Kind::imposed;
-  s.shaft.angle_rad = random.uniform(0, 2 * pi);
-  if (scene == push) s.shaft.speed_rad_per_s = random.uniform(200, 800);
-  if (scene == walk) {
-    s.shaft.speed_amplitude_rad_per_s = 600;
-    s.shaft.frequency_Hz = 1.4;
-    Demand gait{.from_s = 0.1, .to_s = 1e6, .current_A = 5, .ripple_ratio = 0.8, .frequency_Hz = 1.4};
-    s.demands = {gait, gait};
-    s.demands[1].axis = 1, s.demands[1].current_A = 3;
-  }
-  d.fault_s = random.uniform(0.3, 1.3);
-  return d;
-}
-
-constexpr const char* motors[] = {"ec-16-40w", "ec-powermax-30-48v", "ec-powermax-30-24v"};
-
 Stand::Outcome played(const Row& row, const std::string& motor, Scenes scene, std::uint64_t seed) {
   Random random(seed);
   Design design = design_of(motor, scene, row.seconds, random);
   const wire::Motor sheet = design.truth;
   if (row.before) row.before(design, random);
   const bool another = row.id.rfind("F13", 0) == 0;  // than its sheet says; else the firmware knows the motor
-  design.known = another ? sheet : host_sim::true_sheet(design.truth, host_sim::heat_from_sheet(design.truth));
-  design.estimator.trust = another ? thermal::sheet_trust : thermal::exact_trust;
+  tell_the_truth(design);
+  if (another) design.known = sheet, design.estimator.trust = thermal::sheet_trust;
   Stand stand(design, random.next());
   return stand.play(row.fault, row.evident, row.reacted);
 }
@@ -551,14 +520,10 @@ int main(int argc, char** argv) {
             const bool breaks = row.fault || row.overshoot_K == 0;
             found.add(o, breaks ? overshoot_without_K(motors[m], scene, seed, without_K) : 0);
             if (each_run)
-              fmt::print(stderr,
-                         "{}{:<5} {:<19} {:<5} shown {:7.2f} ms, answered {:7.2f} ms, {} {}, {:+.2f} K, {:.1f} A\n",
-                         terminal ? "\r" : "", row.id, motors[m],
-                         scene == push    ? "push"
-                         : scene == stall ? "stall"
-                                          : "walk",
-                         1e3 * o.evident_s, 1e3 * o.reacted_s, wire::text_of(o.fault).name, wire::text_of(o.limit).name,
-                         o.overshoot_K, o.peak_A);
+              fmt::print(
+                  stderr, "{}{:<5} {:<19} {:<5} shown {:7.2f} ms, answered {:7.2f} ms, {} {}, {:+.2f} K, {:.1f} A\n",
+                  terminal ? "\r" : "", row.id, motors[m], faults::name_of(scene), 1e3 * o.evident_s, 1e3 * o.reacted_s,
+                  wire::text_of(o.fault).name, wire::text_of(o.limit).name, o.overshoot_K, o.peak_A);
           }
         }
       }

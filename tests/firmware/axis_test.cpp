@@ -43,6 +43,10 @@ struct AxisProbe {
         break;
     }
   }
+  static void flip_mode(Axis& axis, unsigned bit) {
+    axis.mode_ = static_cast<Mode>(static_cast<unsigned>(axis.mode_) ^ 1u << bit);
+  }
+  static void raise_trip_level(Axis& axis) { axis.rating_.trip_A *= 4.0f; }
   static AxisParameters with(float value) {
     AxisParameters p = bench::parameters();
     p.phase_resistance_ohm = p.flux_linkage_Wb = p.rotor_bandwidth_Hz = value;
@@ -392,6 +396,44 @@ TEST(Axis, DamagedMemoryNeverMakesADutyThatIsNone) {
       }
     }
   }
+}
+
+TEST(Axis, AModeThatFlipsTripsWithinAMillisecond) {
+  for (const Mode mode : {Mode::off, Mode::ready, Mode::running, Mode::tripped}) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      Rig rig;
+      rig.run(2400);
+      if (mode == Mode::ready || mode == Mode::running) rig.bring_up();
+      if (mode == Mode::running) rig.hold({0.0f, 5.0f}, 400);
+      if (mode == Mode::tripped) rig.axis().hold({Fault::over_current});
+      ASSERT_EQ(rig.axis().mode(), mode);
+      AxisProbe::flip_mode(rig.axis(), bit);
+      (void)rig.axis().set_current({0.0f, 5.0f});
+      rig.run(21);
+      EXPECT_EQ(rig.axis().mode(), Mode::tripped) << firmware::text_of(mode) << " bit " << bit;
+      EXPECT_EQ(rig.axis().fault().fault, Fault::memory_changed);
+      EXPECT_FALSE(rig.duty.on);
+    }
+  }
+}
+
+TEST_F(Running, NoSetOfParametersVouchesForALimitThatFlipped) {
+  AxisProbe::raise_trip_level(axis());
+  run(201);
+  EXPECT_EQ(axis().mode(), Mode::tripped);
+  EXPECT_EQ(axis().fault().fault, Fault::memory_changed);
+  (void)axis().set_current({0.0f, 0.0f});
+  ASSERT_EQ(axis().clear(), Status::done);
+  run(1);
+  driver.configure(0, bench::axis_setup(), firmware::HeatModel::unchanged);
+  run(2400);
+  EXPECT_EQ(axis().arm(), Status::done);
+  for (int i = 0; i < 10; ++i) {
+    (void)axis().set_current({0.0f, 5.0f});
+    run(100);
+    EXPECT_FALSE(duty.on);
+  }
+  EXPECT_EQ(axis().mode(), Mode::tripped);
 }
 
 TEST_F(Running, DisarmOpensTheBridgeAtTheNextTick) {

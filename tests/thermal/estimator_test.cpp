@@ -966,6 +966,38 @@ TEST(Estimator, ConstantHeatCountsThoughNobodyReportsIt) {
   EXPECT_NEAR(core.estimate().housing_degC, 30.0 + W * m.R2_K_per_W, 0.01);
 }
 
+TEST(SlowEstimator, WhicheverBitFlipsNothingSeemsColderOrMayDoMore) {  // slow, and a bool of 3 is what UBSan is for
+  Bench b(reference::ec16(), with(thermal::exact_trust), 25);
+  b.run(5, 60);
+  const auto next_of = [](CoreEstimator& core, std::size_t byte, unsigned bit) {
+    if (bit < 8) reinterpret_cast<unsigned char*>(&core)[byte] ^= static_cast<unsigned char>(1u << bit);
+    return core.tick(current(100), at_25);
+  };
+  CoreEstimator calm = b.core;
+  const thermal::Estimate expected = next_of(calm, 0, 8);
+  thermal::Governor governor({});
+  const float allowed_A = governor.tick(calm).current_A;
+  ASSERT_GT(allowed_A, 0.0f);
+  int found = 0;
+  for (std::size_t byte = 0; byte < sizeof(CoreEstimator); ++byte) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      CoreEstimator flipped = b.core;
+      const thermal::Estimate now = next_of(flipped, byte, bit);
+      ASSERT_GE(now.hottest_margin_degC(), expected.hottest_margin_degC()) << byte << " bit " << bit;
+      thermal::Governor fresh({});
+      ASSERT_LE(fresh.tick(flipped).current_A, allowed_A) << byte << " bit " << bit;
+      if (now.flags & thermal::model_changed) {
+        EXPECT_EQ(flipped.save().node_count, 0) << "what another model made of it must not be remembered";
+        flipped.replace(thermal::three_phase_set(reference::ec16()), {});
+        flipped.tick(current(100), at_25);
+        EXPECT_FALSE(flipped.estimate().flags & thermal::model_changed);
+      }
+      found += (now.flags & (thermal::model_changed | thermal::state_restored)) != 0;
+    }
+  }
+  EXPECT_GT(found, 8000);  // a kilobyte at least is in use
+}
+
 TEST(Estimator, WithoutAnySensorTheAmbientIsBelievedHot) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   for (int i = 0; i < 100000; ++i) core.tick({}, missing);
