@@ -186,6 +186,7 @@ float wait_s(Console& console, int axis, const std::vector<wire::Segment>& segme
   float little_s = 0, enough_s = 0.999f * (wire::longest_ask_s - whole_s);  // rounding makes no course too long
   if (segments.size() == wire::max_segments || !(enough_s > 0) || !fits(enough_s)) return INFINITY;
   while (enough_s - little_s > 0.05f * enough_s) {
+    stop_if_interrupted("Stopped; nothing was changed.");
     const float middle_s = 0.5f * (little_s + enough_s);
     (fits(middle_s) ? enough_s : little_s) = middle_s;
   }
@@ -216,6 +217,7 @@ void ask(Console& console, const std::string& axis, const std::string& course, b
   text += fmt::format("  turning, all phases share the heat:        {}.\n", sentence_of(turning));
   const bool by_turning = turns || (stands && !goes);
   const bool feasible = by_turning ? goes : stands;
+  if (!feasible) console.tell("Looking for a rest after which it fits ...\n");
   const float rest_s = feasible ? 0 : wait_s(console, index, segments, whole_s, !by_turning);
   if (rest_s > 0)
     text += std::isfinite(rest_s) ? fmt::format("  After {:.2g} s of rest it fits.\n", rest_s)

@@ -138,7 +138,6 @@ Dictionary Session::fetch(const std::string& kind, std::uint16_t count, bool par
                             : link::signal_in(request(Kind::describe_signal, bytes_of(index), what));
     if (!entry) misread(what);
     entries.push_back(std::move(*entry));
-    progress(static_cast<double>(i + 1) / count);
   }
   return Dictionary(kind, std::move(entries));
 }

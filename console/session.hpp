@@ -66,8 +66,6 @@ class Session {
   double now_s() const { return board_.now_s(); }
   /// Lets telemetry come in until then.
   void wait_until(double time_s);
-  /// Called between the parts of long fetches with the share done.
-  std::function<void(double)> progress = [](double) {};
 
  private:
   /// A frame that has arrived and is no telemetry.
