@@ -199,7 +199,7 @@ void Application::every_ms(std::uint32_t ms) {
   if (ms - slow_ms_ >= 10) {
     slow_ms_ = ms;
     slow_lane();
-  } else {
+  } else if (!link_.looks_ahead()) {  // one at a time: curved laws of cooling make a step dear
     driver_.look_ahead();
   }
   // Fed only if everybody has moved on: both fast lanes since the last time, the slow lane within its time.

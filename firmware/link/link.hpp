@@ -47,6 +47,9 @@ class Link {
     }
   }
 
+  /// Between two slices of an `ask`.
+  bool looks_ahead() const { return looking_ahead_; }
+
   Commands& commands() { return commands_; }
   /// A commit or a save for the text port, as an errand like any other. False: an earlier one is not done. USB context.
   bool begin(wire::Kind kind);
