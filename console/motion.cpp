@@ -142,7 +142,7 @@ std::string sentence_of(const wire::Outlook& outlook) {
     return fmt::format("the hottest winding would reach {:.1f} degC, doubt included", outlook.peak_degC);
   const std::string unlimited =
       std::isfinite(outlook.peak_degC)
-          ? fmt::format(" (unlimited, the winding would reach {:.0f} degC)", outlook.peak_degC)
+          ? fmt::format(" (unlimited, doubt included, the winding would reach {:.0f} degC)", outlook.peak_degC)
           : "";
   return fmt::format(
       "the limit is met after {:.2f} s and {:.0f} % of the ampere-seconds; from there on less "

@@ -52,7 +52,7 @@ TEST(Figures, TheFastLaneTakesLessThanHalfOfEachHalfPeriodAtTwoCyclesPerInstruct
 }
 
 // The dearest set that a save holds, looked ahead with for as long as may be asked, both axes driven meanwhile.
-TEST(Figures, ALookAheadInTheDearestModelLetsTheSlowLaneKeepItsTimeAndIsAnswered) {
+TEST(SlowFigures, ALookAheadInTheDearestModelLetsTheSlowLaneKeepItsTimeAndIsAnswered) {
   NEEDS_IMAGE(image);
   for (const unsigned cycles : {1u, 2u}) {
     Options o;

@@ -289,7 +289,7 @@ TEST_F(Commands, AskAnswersForARotorThatStandsUnlessItIsSaidToTurn) {
             "Not in full where the rotor stands; --turning answers for one that turns.\n"
             "  standing, the hottest phase at any angle:  the limit is met after 0.21 s and 80 % of the "
             "ampere-seconds; from there on "
-            "less is delivered (unlimited, the winding would reach 171 degC).\n"
+            "less is delivered (unlimited, doubt included, the winding would reach 171 degC).\n"
             "  turning, all phases share the heat:        the hottest winding would reach 98.0 degC, doubt included.\n"
             "  It does not fit after any rest that the board can look beyond, 60 s with the course itself.\n");
   const auto outlook = json("ask \"20A 0.3s\"");
