@@ -97,11 +97,11 @@ double course_A(const Values& values) {
 }
 
 std::vector<Piece> cold_course(const Values& values) {
-  const double rated_A = course_A(values);
+  const double whole_A = course_A(values);
   // Five time constants as the board believes them, which may be off by a few times.
   const double rest_s = std::clamp(5 * value_of(values, "R1_K_per_W") * value_of(values, "C1_J_per_K"), 3.0, 20.0);
   const auto look = [&](double share) {
-    return Piece{static_cast<float>(share * rated_A), static_cast<float>(probe_s)};
+    return Piece{static_cast<float>(share * whole_A), static_cast<float>(probe_s)};
   };
   const Piece rest{0, static_cast<float>(rest_s)};
   std::vector<Piece> course;

@@ -85,8 +85,8 @@ constexpr float turning_rad_per_s = 120;
 Driven record(Console& console, int axis, const Values& before, const Arguments& a, const std::string& log) {
   Session& session = console.session();
   const auto mask = static_cast<std::uint8_t>(1 << axis);
-  const double rated_A = course_A(before);
-  std::vector<Piece> course = designed_course(rated_A, a.minutes);
+  const double whole_A = course_A(before);
+  std::vector<Piece> course = designed_course(whole_A, a.minutes);
   double length_s = 0, told_s = -1e9;
   for (const Piece& piece : course) length_s += double{piece.seconds};
   const auto look = [&](const wire::State& state, double time_s) {
@@ -103,7 +103,7 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
 
   const std::string what = fmt::format("axis {}, designed course for identification", axis);
   WindingLog winding(
-      Ohmmeter(static_cast<float>(probe_share * rated_A), static_cast<float>(larger_share * rated_A), a.leads_ohm));
+      Ohmmeter(static_cast<float>(probe_share * whole_A), static_cast<float>(larger_share * whole_A), a.leads_ohm));
   Recorder recorder =
       a.turning
           ? Recorder(
@@ -122,7 +122,7 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
           console.tell(
               fmt::format("The winding cannot be read: {:.1f} and {:.1f} A did not flow, or --leads is too much; is "
                           "the current limited?",
-                          probe_share * rated_A, larger_share * rated_A));
+                          probe_share * whole_A, larger_share * whole_A));
         play({course.front()}, 0);
         course.erase(course.begin());
       }
@@ -190,13 +190,13 @@ void identify(Console& console, const Arguments& a) {
   const int axis = a.axis == "1" ? 1 : 0;
   need_mode(console, static_cast<std::uint8_t>(1 << axis), wire::ControlMode::current);
   const Values before = values_of(session, axis);
-  const double rated_A = course_A(before);
+  const double whole_A = course_A(before);
   wire::pc::write_whole(sheet, sheet_of(before, fmt::format("axis {} of {}", axis, session.name())));
 
   console.tell(fmt::format(
       "Heating axis {} for {:g} min with up to {:.1f} A along the magnet, which makes no torque; the shaft "
       "{}. Ctrl-C disarms.{}",
-      axis, a.minutes, 2.5 * rated_A, a.turning ? "must be free, it turns slowly" : "must be free to stand still",
+      axis, a.minutes, 2.5 * whole_A, a.turning ? "must be free, it turns slowly" : "must be free to stand still",
       a.ambient_degC ? "" : " Without --ambient DEGC the room is taken to be as warm as the motor is now."));
   const Driven driven = record(console, axis, before, a, log);
   console.tell(fmt::format("The winding reached {:.1f} degC (estimated). Asking identify.", driven.peak_degC));

@@ -18,7 +18,7 @@ using wire::pc::UserError;
 // An answer takes milliseconds; the slow ones erase a flash sector (up to 2 s on an STM32F405, its data sheet's Table
 // 43, rounded up) or think ahead over hours.
 constexpr double slow_s = 5.0;
-// 60 s ahead take a board 1.2 s, in the dearest model up to 6 s.
+// 60 s ahead take a board 1.2 s, in the dearest model up to 7 s.
 constexpr double look_ahead_s = 15.0;
 
 template <class Message>
