@@ -1,16 +1,7 @@
 // SPDX-License-Identifier: MIT
 // F19: flips one bit of the firmware's Driver, any bit of any byte, at a random instant on a simulated board whose axes
 // both work near their limits (a push, a stall, a walk) or are disarmed and spoken to all the same. Each flip is a
-// forked trial beside one that nothing happens to; then the host falls silent. What became of it:
-//
-//   no effect   the plant ended as without the flip, to the last digit
-//   harmless    it did not, but nothing below happened
-//   detected    an axis said so: tripped or stopped, or a flag of its estimate rose; and nothing below happened
-//   watchdog    the program hung in a tick: on the chip a watchdog opens the bridge
-//   harmful     a winding more than 3 K above its limit, or the power stage above its own; or for longer than 10 ms
-//               more than a tenth above the peak current, torque against or beyond the demand; above the trip level
-//               for more than the 100 us of a saturated reading, bridge on; half of the torque lost without a word; a
-//               bridge still on 310 ms after the host's last word; or the program crashed
+// forked trial beside one that nothing happens to; then the host falls silent (flip_judge.hpp: what may become of it).
 //
 // The host's object stands for the chip's: its sizes are 64 bits where those of the chip are 32. A flip comes between
 // two PWM periods, so never into the middle of a tick; on the chip the slow lane works for 1.4 of its 10 ms at least
@@ -28,8 +19,7 @@
 #include <functional>
 #include <map>
 
-#include "boards/dual_48v_20a.hpp"
-#include "tests/boards-host/fault_stand.hpp"
+#include "tests/boards-host/flip_judge.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 
@@ -58,14 +48,10 @@ namespace {
 using namespace faults;
 using host_sim::Random;
 
-constexpr int axes = firmware::axis_count;
-constexpr double most_over_K = 3, stage_max_degC = 100;    // as F19 promises; the stage's own limit
-constexpr double noticed_s = 0.010, silent_s = 0.310;      // F19; time-out, ramp and 5 ms of F21, and one tick
-constexpr double torque_share = 0.2, current_share = 1.1;  // of the largest demand, of the peak
-constexpr double trip_A = static_cast<double>(boards::dual_48V_20A.trip_A), trip_s = 125e-6;  // two periods
-constexpr double lost_share = 0.5, last_s = 0.5;  // of the torque of the same run without the flip; its end
-constexpr double after_trip_s = 0.3;              // an open bridge only cools
-constexpr long hang_us = 300'000;                 // of CPU without a period, which takes 10: it hangs
+constexpr double silent_s = 0.310;    // time-out, ramp and 5 ms of F21, and one tick
+constexpr double last_s = 0.5;        // in which torque is compared
+constexpr double after_trip_s = 0.3;  // an open bridge only cools
+constexpr long hang_us = 300'000;     // of CPU without a period, which takes 10: it hangs
 
 constexpr const char* examples =
     "Examples:\n"
@@ -73,31 +59,6 @@ constexpr const char* examples =
     "  flips --flips 400 --seconds 2 --motors 1 --check 0.99\n"
     "  flips --part rotor_ --list   only there, and each flip that did harm\n"
     "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
-
-/// What is seen of both axes in a trial; crosses a pipe.
-struct Seen {
-  double over_K[axes] = {-1e9, -1e9}, stage_over_K = -1e9;  // hottest winding over its limit
-  double most_A = 0;
-  double above_peak_s = 0, above_trip_s = 0, wrong_s = 0;  // longest stretches
-  double last_Nm[axes] = {}, told_s = -1;
-  std::uint32_t flags[axes] = {};
-  bool limited[axes] = {}, silent_on = false;
-  double digits[5 * axes] = {};  // how the plant ended
-};
-
-/// The longest stretch of time in which something was so.
-struct Stretch {
-  double now_s = 0, worst_s = 0;
-  void see(bool so, double dt_s) { worst_s = std::max(worst_s, now_s = so ? now_s + dt_s : 0); }
-};
-
-/// The torque is against what is asked for, or more than that.
-bool is_wrong(const Stand& s, int axis) {
-  const double wish_A = s.arms ? boards::host::demand_A(s.design().scene, axis, s.time_s()) : 0;
-  const double per_A = 1.5 * s.design().truth.pole_pairs * s.design().truth.flux_linkage_Wb;
-  const double slack_Nm = torque_share * s.largest_demand_Nm(axis), torque_Nm = s.bench.truth(axis).torque_Nm;
-  return torque_Nm < std::min(0.0, wish_A * per_A) - slack_Nm || torque_Nm > std::max(0.0, wish_A * per_A) + slack_Nm;
-}
 
 volatile std::sig_atomic_t periods_since_look = 1;
 constexpr int hung = 3;
@@ -109,77 +70,33 @@ void look_for_a_hang(int) {
 
 /// Runs on for `seconds`, then without a host. `calm`: what is seen without the flip, nullptr: this is it.
 Seen watched(Stand& s, double seconds, const Seen* calm) {
-  Seen seen;
-  Stretch above_peak, above_trip[axes], wrong[axes], elsewhere[axes];
-  firmware::Mode before[axes];
-  for (int a = 0; a < axes; ++a) before[a] = s.arms ? firmware::Mode::running : firmware::Mode::off;
-  const double dt_s = s.bench.period_s(), from_s = s.time_s();
+  FlipJudge judge(s.design(), s.arms, calm);
+  const firmware::Mode before = s.arms ? firmware::Mode::running : firmware::Mode::off;
+  const double from_s = s.time_s();
   double to_s = from_s + seconds;
-  int last = 0;
+  AxisView now[axes];
   const auto period = [&] {
     s.step();
     periods_since_look = 1;
-    double most_A = 0;
-    bool told = false;
     for (int a = 0; a < axes; ++a) {
-      const host_sim::AxisTruth now = s.bench.truth(a);
       const firmware::Axis& axis = s.driver->axis(a);
-      seen.over_K[a] = std::max(seen.over_K[a], now.hottest_degC - s.design().truth.winding_max_degC);
-      double largest_A = 0;
-      for (const double i_A : now.current_A) largest_A = std::max(largest_A, std::abs(i_A));
-      most_A = std::max(most_A, largest_A);
-      seen.flags[a] |= axis.state().estimate_flags;
       const firmware::Mode mode = axis.mode();
-      above_trip[a].see(largest_A > trip_A && mode == firmware::Mode::running, dt_s);
-      elsewhere[a].see(mode != before[a] && mode <= firmware::Mode::tripped, dt_s);
-      told = told || mode == firmware::Mode::tripped || elsewhere[a].now_s > noticed_s ||
-             (calm != nullptr && (seen.flags[a] & ~calm->flags[a]) != 0);
-      if (s.host_alive) seen.limited[a] = axis.fast().limit != wire::Limit::none || mode == firmware::Mode::tripped;
-      if (mode == firmware::Mode::tripped) to_s = std::min(to_s, s.time_s() + after_trip_s);
-      if (s.host_alive) wrong[a].see(is_wrong(s, a), dt_s);
-      if (s.host_alive && s.time_s() > to_s - last_s) seen.last_Nm[a] += now.torque_Nm;
+      now[a] = {s.bench.truth(a),
+                mode == firmware::Mode::running,
+                mode != before && mode <= firmware::Mode::tripped,
+                mode == firmware::Mode::tripped,
+                axis.fast().limit != wire::Limit::none,
+                axis.state().estimate_flags};
+      if (now[a].tripped) to_s = std::min(to_s, s.time_s() + after_trip_s);
     }
-    last += s.host_alive && s.time_s() > to_s - last_s;
-    if (told && s.host_alive && seen.told_s < 0) seen.told_s = s.time_s() - from_s;
-    seen.stage_over_K = std::max(seen.stage_over_K, s.bench.power_stage_degC() - stage_max_degC);
-    above_peak.see(most_A > current_share * peak_A, dt_s);
+    judge.see(now, s.bench.power_stage_degC(), s.time_s(), s.time_s() - from_s, s.bench.period_s(), s.host_alive,
+              s.time_s() > to_s - last_s);
   };
   while (s.time_s() < to_s) period();
   s.host_alive = false;
   const double silent_from_s = s.time_s();
   while (s.time_s() < silent_from_s + silent_s) period();
-  std::size_t digit = 0;
-  for (int a = 0; a < axes; ++a) {
-    const host_sim::AxisTruth end = s.bench.truth(a);
-    for (const double x : {end.hottest_degC, end.housing_degC, end.current_A[0], end.current_A[1], end.torque_Nm})
-      seen.digits[digit++] = x;
-    seen.last_Nm[a] /= std::max(last, 1);
-    seen.silent_on = seen.silent_on || s.driver->axis(a).mode() == firmware::Mode::running;
-    seen.wrong_s = std::max(seen.wrong_s, wrong[a].worst_s);
-    seen.above_trip_s = std::max(seen.above_trip_s, above_trip[a].worst_s);
-  }
-  seen.above_peak_s = above_peak.worst_s;
-  return seen;
-}
-
-enum class Became { no_effect, harmless, detected, watchdog, harmful };
-constexpr int kinds = 5;
-
-/// What is wrong in a trial; empty: nothing.
-std::string harm(const Seen& seen, const Seen& calm) {
-  for (int a = 0; a < axes; ++a) {
-    if (seen.over_K[a] - std::max(calm.over_K[a], 0.0) > most_over_K)
-      return fmt::format("axis {}: winding {:.1f} K over", a, seen.over_K[a]);
-    if (std::abs(seen.last_Nm[a]) < lost_share * std::abs(calm.last_Nm[a]) && seen.told_s < 0 && !seen.limited[a])
-      return fmt::format("axis {}: torque lost", a);
-  }
-  if (seen.stage_over_K - std::max(calm.stage_over_K, 0.0) > 0)
-    return fmt::format("power stage {:.1f} K over", seen.stage_over_K);
-  if (seen.above_trip_s > trip_s) return fmt::format("above the trip level for {:.4f} s", seen.above_trip_s);
-  if (seen.above_peak_s > noticed_s) return fmt::format("above the peak for {:.3f} s", seen.above_peak_s);
-  if (seen.wrong_s > noticed_s) return fmt::format("wrong torque for {:.3f} s", seen.wrong_s);
-  if (seen.silent_on) return "runs on without a host";
-  return "";
+  return judge.ended(now, {now[0].on, now[1].on});
 }
 
 struct Flip {
@@ -187,42 +104,24 @@ struct Flip {
   unsigned bit;
 };
 
-struct Verdict {
-  Became became;
-  std::string why;
-  double told_s = -1;
-};
-
-/// A trial in a process of its own. Without a flip: what is seen is the calm that others are held against.
+/// Without a flip: what is seen is the calm that others are held against.
 Verdict trial(Stand& stand, double seconds, const Flip* flip, Seen& calm) {
-  int ends[2];
-  if (pipe(ends) != 0) throw std::runtime_error("no pipe");
-  const pid_t child = fork();
-  if (child < 0) throw std::runtime_error("no process");
-  if (child == 0) {
-    (void)!freopen("/dev/null", "w", stderr);  // an assertion speaks up
+  const auto play = [&] {
     std::signal(SIGPROF, look_for_a_hang);
     const itimerval beat{{0, hang_us}, {0, hang_us}};
     setitimer(ITIMER_PROF, &beat, nullptr);
     if (flip != nullptr)
       reinterpret_cast<unsigned char*>(&*stand.driver)[flip->byte] ^= static_cast<unsigned char>(1u << flip->bit);
-    const Seen seen = watched(stand, seconds, flip == nullptr ? nullptr : &calm);
-    _exit(write(ends[1], &seen, sizeof seen) == sizeof seen ? 0 : 1);
-  }
-  close(ends[1]);
+    return watched(stand, seconds, flip == nullptr ? nullptr : &calm);
+  };
   Seen seen;
-  const bool whole = read(ends[0], &seen, sizeof seen) == sizeof seen;
-  close(ends[0]);
   int status = 0;
-  waitpid(child, &status, 0);
-  if (!whole && WIFEXITED(status) && WEXITSTATUS(status) == hung) return {Became::watchdog, "hangs"};
-  if (!whole) return {Became::harmful, fmt::format("crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
+  if (!play_forked<Seen>(play, seen, status)) {
+    if (WIFEXITED(status) && WEXITSTATUS(status) == hung) return {Became::watchdog, "hangs"};
+    return {Became::harmful, fmt::format("crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
+  }
   if (flip == nullptr) calm = seen;
-  const std::string why = harm(seen, calm);
-  if (!why.empty()) return {Became::harmful, why, seen.told_s};
-  if (seen.told_s >= 0) return {Became::detected, "", seen.told_s};
-  const bool same = std::memcmp(seen.digits, calm.digits, sizeof seen.digits) == 0;
-  return {same ? Became::no_effect : Became::harmless, ""};
+  return verdict_of(seen, calm);
 }
 
 /// A part of the object; the first that holds a byte gives it its name.
@@ -246,26 +145,6 @@ std::vector<Part> parts_of(const firmware::Driver& driver) {
   parts.push_back({"board_heat_", offset(&driver.board_heat()), sizeof driver.board_heat()});
   parts.push_back({"the rest", 0, sizeof driver});
   return parts;
-}
-
-struct Tally {
-  int became[kinds] = {}, soon = 0;  // the latter: detected within the 10 ms of F19
-  int all() const {
-    int sum = 0;
-    for (const int n : became) sum += n;
-    return sum;
-  }
-  int of(Became b) const { return became[static_cast<int>(b)]; }
-  void add(const Verdict& v) {
-    ++became[static_cast<int>(v.became)];
-    soon += v.became == Became::detected && v.told_s <= noticed_s;
-  }
-};
-
-std::string line(const std::string& name, std::size_t bytes, const Tally& t) {
-  return fmt::format("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", name, bytes, t.all(),
-                     t.of(Became::no_effect), t.of(Became::harmless), t.of(Became::detected), t.of(Became::watchdog),
-                     t.of(Became::harmful));
 }
 
 }  // namespace
@@ -336,13 +215,8 @@ int main(int argc, char** argv) {
                      verdict.told_s >= 0 ? fmt::format(", told after {:.3f} s", verdict.told_s) : "");
       }
     }
-    fmt::print("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", "part", "bytes", "flips", "no effect", "harmless",
-               "detected", "watchdog", "harmful");
+    fmt::print("{}", head_line());
     for (const auto& [name, found] : by_part) fmt::print("{}", line(name, found.first, found.second));
-    fmt::print("{}", line("all", size, sum));
-    const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
-    fmt::print("{:.2f} % detected or harmless; {} of {} detected within 10 ms\n", 100 * share, sum.soon,
-               sum.of(Became::detected));
-    return share < least ? 1 : 0;
+    return print_sum(sum, size) < least ? 1 : 0;
   });
 }

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#include "tests/boards-host/flip_judge.hpp"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+
+#include "boards/dual_48v_20a.hpp"
+
+namespace faults {
+namespace {
+
+constexpr double most_over_K = 3, stage_max_degC = 100;    // as F19 promises; the stage's own limit
+constexpr double torque_share = 0.2, current_share = 1.1;  // of the largest demand, of the peak
+constexpr double trip_A = static_cast<double>(boards::dual_48V_20A.trip_A), trip_s = 125e-6;  // two periods
+constexpr double lost_share = 0.5;  // of the torque of the same run without the flip
+
+/// What is wrong in a trial; empty: nothing.
+std::string harm(const Seen& seen, const Seen& calm) {
+  if (seen.mistake[0] != 0) return seen.mistake;
+  for (int a = 0; a < axes; ++a) {
+    if (seen.over_K[a] - std::max(calm.over_K[a], 0.0) > most_over_K)
+      return fmt::format("axis {}: winding {:.1f} K over", a, seen.over_K[a]);
+    if (std::abs(seen.last_Nm[a]) < lost_share * std::abs(calm.last_Nm[a]) && seen.told_s < 0 && !seen.watchdog &&
+        !seen.limited[a])
+      return fmt::format("axis {}: torque lost", a);
+  }
+  if (seen.stage_over_K - std::max(calm.stage_over_K, 0.0) > 0)
+    return fmt::format("power stage {:.1f} K over", seen.stage_over_K);
+  if (seen.above_trip_s > trip_s) return fmt::format("above the trip level for {:.4f} s", seen.above_trip_s);
+  if (seen.above_peak_s > noticed_s) return fmt::format("above the peak for {:.3f} s", seen.above_peak_s);
+  if (seen.wrong_s > noticed_s) return fmt::format("wrong torque for {:.3f} s", seen.wrong_s);
+  if (seen.silent_on) return "runs on without a host";
+  return "";
+}
+
+}  // namespace
+
+/// The torque is against what is asked for, or more than that.
+bool FlipJudge::is_wrong(const host_sim::AxisTruth& now, int axis, double time_s) const {
+  const double wish_A = asked_ ? boards::host::demand_A(design_.scene, axis, time_s) : 0;
+  const double per_A = 1.5 * design_.truth.pole_pairs * design_.truth.flux_linkage_Wb;
+  const double slack_Nm = torque_share * largest_demand_Nm(design_, axis);
+  return now.torque_Nm < std::min(0.0, wish_A * per_A) - slack_Nm ||
+         now.torque_Nm > std::max(0.0, wish_A * per_A) + slack_Nm;
+}
+
+void FlipJudge::see(const AxisView (&now)[axes], double stage_degC, double time_s, double since_s, double dt_s,
+                    bool host_alive, bool last) {
+  double most_A = 0;
+  bool told = false;
+  for (int a = 0; a < axes; ++a) {
+    const AxisView& axis = now[a];
+    seen_.over_K[a] = std::max(seen_.over_K[a], axis.truth.hottest_degC - design_.truth.winding_max_degC);
+    double largest_A = 0;
+    for (const double i_A : axis.truth.current_A) largest_A = std::max(largest_A, std::abs(i_A));
+    most_A = std::max(most_A, largest_A);
+    seen_.flags[a] |= axis.flags;
+    above_trip_[a].see(largest_A > trip_A && axis.on, dt_s);
+    elsewhere_[a].see(axis.elsewhere, dt_s);
+    told = told || axis.tripped || elsewhere_[a].now_s > noticed_s ||
+           (calm_ != nullptr && (seen_.flags[a] & ~calm_->flags[a]) != 0);
+    if (host_alive) seen_.limited[a] = axis.limited || axis.tripped;
+    if (host_alive) wrong_[a].see(is_wrong(axis.truth, a, time_s), dt_s);
+    if (host_alive && last) seen_.last_Nm[a] += axis.truth.torque_Nm;
+  }
+  last_ += host_alive && last;
+  if (told && host_alive && seen_.told_s < 0) seen_.told_s = since_s;
+  seen_.stage_over_K = std::max(seen_.stage_over_K, stage_degC - stage_max_degC);
+  above_peak_.see(most_A > current_share * peak_A, dt_s);
+}
+
+Seen FlipJudge::ended(const AxisView (&now)[axes], const bool (&still_on)[axes]) {
+  std::size_t digit = 0;
+  for (int a = 0; a < axes; ++a) {
+    const host_sim::AxisTruth& end = now[a].truth;
+    for (const double x : {end.hottest_degC, end.housing_degC, end.current_A[0], end.current_A[1], end.torque_Nm})
+      seen_.digits[digit++] = x;
+    seen_.last_Nm[a] /= std::max(last_, 1);
+    seen_.silent_on = seen_.silent_on || still_on[a];
+    seen_.wrong_s = std::max(seen_.wrong_s, wrong_[a].worst_s);
+    seen_.above_trip_s = std::max(seen_.above_trip_s, above_trip_[a].worst_s);
+  }
+  seen_.above_peak_s = above_peak_.worst_s;
+  return seen_;
+}
+
+Verdict verdict_of(const Seen& seen, const Seen& calm) {
+  if (seen.same) return {Became::no_effect, ""};
+  const std::string why = harm(seen, calm);
+  if (!why.empty()) return {Became::harmful, why, seen.told_s};
+  if (seen.watchdog) return {Became::watchdog, ""};
+  if (seen.told_s >= 0) return {Became::detected, "", seen.told_s};
+  const bool same = std::memcmp(seen.digits, calm.digits, sizeof seen.digits) == 0;
+  return {same ? Became::no_effect : Became::harmless, ""};
+}
+
+bool play_forked(const std::function<const void*()>& trial, void* found, std::size_t bytes, int& status) {
+  int ends[2];
+  if (pipe(ends) != 0) throw std::runtime_error("no pipe");
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error("no process");
+  const auto all = static_cast<ssize_t>(bytes);
+  if (child == 0) {
+    (void)!freopen("/dev/null", "w", stderr);              // an assertion speaks up
+    _exit(write(ends[1], trial(), bytes) == all ? 0 : 1);  // less than a pipe holds
+  }
+  close(ends[1]);
+  const bool whole = read(ends[0], found, bytes) == all;
+  close(ends[0]);
+  waitpid(child, &status, 0);
+  return whole;
+}
+
+int Tally::all() const {
+  int sum = 0;
+  for (const int n : became) sum += n;
+  return sum;
+}
+
+void Tally::add(const Verdict& v) {
+  ++became[static_cast<int>(v.became)];
+  soon += v.became == Became::detected && v.told_s <= noticed_s;
+}
+
+std::string head_line() {
+  return fmt::format("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", "part", "bytes", "flips", "no effect",
+                     "harmless", "detected", "watchdog", "harmful");
+}
+
+std::string line(const std::string& name, std::size_t bytes, const Tally& t) {
+  return fmt::format("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", name, bytes, t.all(),
+                     t.of(Became::no_effect), t.of(Became::harmless), t.of(Became::detected), t.of(Became::watchdog),
+                     t.of(Became::harmful));
+}
+
+double print_sum(const Tally& sum, std::size_t bytes) {
+  fmt::print("{}", line("all", bytes, sum));
+  const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
+  fmt::print("{:.2f} % detected or harmless; {} of {} detected within 10 ms\n", 100 * share, sum.soon,
+             sum.of(Became::detected));
+  return share;
+}
+
+}  // namespace faults
