@@ -27,8 +27,9 @@ std::string harm(const Seen& seen, const Seen& calm) {
   for (int a = 0; a < axes; ++a) {
     if (seen.over_K[a] - std::max(calm.over_K[a], 0.0) > most_over_K)
       return fmt::format("axis {}: winding {:.1f} K over", a, seen.over_K[a]);
+    const bool held_back = seen.limited[a] && seen.last_A[a] < lost_share * calm.last_A[a];
     if (std::abs(seen.last_Nm[a]) < lost_share * std::abs(calm.last_Nm[a]) && seen.told_s < 0 && !seen.watchdog &&
-        !seen.limited[a])
+        !held_back)
       return fmt::format("axis {}: torque lost", a);
   }
   if (seen.stage_over_K - std::max(calm.stage_over_K, 0.0) > 0)
@@ -68,7 +69,9 @@ void FlipJudge::see(const AxisView (&now)[axes], double stage_degC, double time_
            (calm_ != nullptr && (seen_.flags[a] & ~calm_->flags[a]) != 0);
     if (host_alive) seen_.limited[a] = axis.limited || axis.tripped;
     if (host_alive) wrong_[a].see(is_wrong(axis.truth, a, time_s), dt_s);
-    if (host_alive && last) seen_.last_Nm[a] += axis.truth.torque_Nm;
+    if (!host_alive || !last) continue;
+    seen_.last_Nm[a] += axis.truth.torque_Nm;
+    seen_.last_A[a] += std::hypot(axis.truth.current_d_A, axis.truth.current_q_A);
   }
   last_ += host_alive && last;
   if (told && host_alive && seen_.told_s < 0) seen_.told_s = since_s;
@@ -83,6 +86,7 @@ Seen FlipJudge::ended(const AxisView (&now)[axes], const bool (&still_on)[axes])
     for (const double x : {end.hottest_degC, end.housing_degC, end.current_A[0], end.current_A[1], end.torque_Nm})
       seen_.digits[digit++] = x;
     seen_.last_Nm[a] /= std::max(last_, 1);
+    seen_.last_A[a] /= std::max(last_, 1);
     seen_.silent_on = seen_.silent_on || still_on[a];
     seen_.wrong_s = std::max(seen_.wrong_s, wrong_[a].worst_s);
     seen_.above_trip_s = std::max(seen_.above_trip_s, above_trip_[a].worst_s);

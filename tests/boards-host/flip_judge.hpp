@@ -28,7 +28,7 @@ inline constexpr double noticed_s = 0.010;  // F19
 struct Seen {
   double over_K[axes] = {-1e9, -1e9}, stage_over_K = -1e9;  // hottest winding over its limit
   double above_peak_s = 0, above_trip_s = 0, wrong_s = 0;   // longest stretches
-  double last_Nm[axes] = {}, told_s = -1;
+  double last_Nm[axes] = {}, last_A[axes] = {}, told_s = -1;
   std::uint32_t flags[axes] = {};
   bool limited[axes] = {}, silent_on = false, watchdog = false, same = false;
   double digits[5 * axes] = {};  // how the plant ended

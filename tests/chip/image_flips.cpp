@@ -49,7 +49,8 @@ constexpr unsigned cycles_per_instruction = 2;  // wait states are not modelled;
 
 /// The image on its board, and a robot's computer on its USB cable.
 struct ChipStand {
-  ChipStand(const Design& its_design, const std::string& elf, std::uint64_t seed)
+  /// `on_index`: at power-on, then somebody turns the shaft; else where it stands is known by the Hall switches alone.
+  ChipStand(const Design& its_design, bool on_index, const std::string& elf, std::uint64_t seed)
       : design(its_design), pcb(plant(design), seed), cable(pcb), host(cable) {
     pcb.flash_image(elf);
     firmware::AxisSet set{
@@ -63,11 +64,16 @@ struct ChipStand {
     pcb.flash_journal({{{warm, {}}, {warm, {}}}, 0.0f});
     pcb.chip.core().set_cycles_per_instruction(cycles_per_instruction);
     for (int a = 0; a < axes; ++a) pcb.bench.load(a) = boards::host::load_of(design.scene.shaft);
-    pcb.power_on(static_cast<std::uint32_t>(seed));  // on its index pulse; then somebody turns the shaft
+    const auto turn = [&] {
+      for (int a = 0; a < axes; ++a)
+        pcb.bench.motor(a).place(design.scene.shaft.angle_rad / design.truth.pole_pairs, 0);
+    };
+    if (!on_index) turn();
+    pcb.power_on(static_cast<std::uint32_t>(seed));
     cable.plug(true);
     if (!host.enumerate() || host.control(0x00, 9, 1, 0, 0).outcome != boards::usb::Outcome::done)
       throw std::runtime_error("the image is no USB device");
-    for (int a = 0; a < axes; ++a) pcb.bench.motor(a).place(design.scene.shaft.angle_rad / design.truth.pole_pairs, 0);
+    if (on_index) turn();
     begin_s = to_s(pcb.chip.now());
   }
 
@@ -180,6 +186,62 @@ struct Flip {
   std::uint32_t address;
   unsigned bit;
   double after_s;
+};
+
+/// What lies where in the RAM, by the image's symbol table (boards/h8-15d/parts.cpp).
+class Parts {
+ public:
+  Parts(const host_sim::chip::Chip& chip, std::uint32_t stack_left_bytes) {
+    const std::string mark = "part ";
+    std::uint32_t application = 0;
+    for (const auto& [name, address] : chip.symbols()) {
+      if (name.find("application_storage") != std::string::npos) application = address;
+    }
+    for (const auto& [name, offset] : chip.symbols()) {
+      if (name.starts_with(mark)) begins_[application + offset] = name.substr(mark.size());
+    }
+    if (begins_.empty()) throw std::runtime_error("the image does not name its parts; build it anew");
+    begins_[Core::ram_base] = "stack, never reached";
+    begins_[Core::ram_base + stack_left_bytes] = "stack";
+    begins_[chip.symbol("stack_top")] = "library";
+    begins_[chip.symbol("door")] = "door";
+    begins_[chip.symbol("door") + sizeof(h8_15d::Door)] = "library";
+    begins_[chip.symbol("bss_end")] = "nothing";
+  }
+
+  std::string full_name(std::uint32_t address) const {
+    const auto part = std::prev(begins_.upper_bound(address));
+    return fmt::format("{} + {}", part->second, address - part->first);
+  }
+  /// As the table has it: members of both axes as one, others by what they belong to.
+  std::string short_name(std::uint32_t address) const {
+    return shortened(std::prev(begins_.upper_bound(address))->second);
+  }
+  std::uint32_t bytes(const std::string& short_name) const {
+    std::uint32_t sum = 0;
+    for (auto part = begins_.begin(); std::next(part) != begins_.end(); ++part) {
+      if (shortened(part->second) == short_name) sum += std::next(part)->first - part->first;
+    }
+    return sum;
+  }
+  /// The n-th byte of all that have this name.
+  std::uint32_t address(const std::string& short_name, std::uint32_t n) const {
+    for (auto part = begins_.begin(); std::next(part) != begins_.end(); ++part) {
+      const std::uint32_t bytes = std::next(part)->first - part->first;
+      if (shortened(part->second) != short_name) continue;
+      if (n < bytes) return part->first + n;
+      n -= bytes;
+    }
+    return 0;
+  }
+
+ private:
+  static std::string shortened(const std::string& name) {
+    const std::string axis = "driver_.axes_[";
+    if (name.starts_with(axis)) return "axis " + name.substr(axis.size() + 3);
+    return name.substr(0, name.find('.'));
+  }
+  std::map<std::uint32_t, std::string> begins_;
 };
 
 /// What the run without a flip looked like: at each look the memory that is in use, and the motors.
@@ -308,8 +370,8 @@ Verdict trial(ChipStand& stand, double seconds, const Flip& flip, Calm& calm) {
 
 int main(int argc, char** argv) {
   CLI::App app{"F19: what becomes of single flipped bits in the RAM of the flash image"};
-  int flips = 1000, motor_count = 3, at_once = 20;
-  double seconds = 0.25;
+  int flips = 1000, motor_count = 3, at_once = 40;
+  double seconds = 0.12;
   std::uint64_t seed = 1000;
   std::string elf = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";
   app.add_option("--flips", flips);
@@ -317,12 +379,15 @@ int main(int argc, char** argv) {
   app.add_option("--seed", seed);
   app.add_option("--motors", motor_count);
   app.add_option("--image", elf);
-  bool list = false, list_all = false;
+  bool list = false;
+  std::vector<std::string> only;
   app.add_flag("--list", list);
-  app.add_flag("--list-all", list_all);
+  app.add_option("--part", only);
   return wire::pc::run_program(app, argc, argv, [&] {
     Random random(seed);
+    std::map<std::string, std::pair<std::size_t, Tally>> by_part;
     Tally sum;
+    std::size_t size = 0;
     for (int n = 0; n < flips;) {
       const Scenes scene = std::array{push, stall, walk, stall}[random.next() % 4];
       const char* const motor = motors[random.next() % static_cast<unsigned>(motor_count)];
@@ -332,7 +397,8 @@ int main(int argc, char** argv) {
         design.scene.demands.push_back(design.scene.demands[0]);
         design.scene.demands[1].axis = 1;
       }
-      ChipStand stand(design, elf, random.next());
+      const bool on_index = scene != stall || random.next() % 2 == 0;
+      ChipStand stand(design, on_index, elf, random.next());
       if (!stand.arm()) throw std::runtime_error("the image would not arm:\n" + stand.pcb.chip.report_text());
       const double instant_s = stand.time_s() + design.fault_s;
       while (stand.time_s() < instant_s) stand.ms([] {});
@@ -347,23 +413,33 @@ int main(int argc, char** argv) {
       const Verdict healthy = verdict_of(calm.seen, calm.seen);
       if (healthy.became != Became::no_effect)
         throw std::runtime_error(fmt::format("without a flip: {} {} {}", motor, name_of(scene), healthy.why));
-      if (list)
-        fmt::print(stderr, "# {} {}: {:.1f} {:.1f} K over, limited {} {}, {:.2f} {:.2f} Nm; {:.1f} {:.1f} A, core {:.1f} sigma {:.1f} flags {:x}\n", motor, name_of(scene),
-                   calm.seen.over_K[0], calm.seen.over_K[1], calm.seen.limited[0], calm.seen.limited[1],
-                   calm.seen.last_Nm[0], calm.seen.last_Nm[1], stand.heard.axis[0].allowance_A, stand.heard.axis[1].allowance_A, stand.heard.axis[0].core_degC, stand.heard.axis[0].core_sigma_K, stand.heard.axis[0].estimate_flags);
+      const Parts parts(stand.pcb.chip, stand.door().stack_left_bytes);
+      const std::uint32_t all = stand.ram_end() - Core::ram_base;
       for (int k = 0; k < at_once && n < flips; ++k, ++n) {
-        const Flip flip = {
-            Core::ram_base + static_cast<std::uint32_t>(random.next() % (stand.ram_end() - Core::ram_base)),
-            static_cast<unsigned>(random.next() % 8), random.uniform(0, flip_within_s)};
+        Flip flip = {Core::ram_base + static_cast<std::uint32_t>(random.next() % all),
+                     static_cast<unsigned>(random.next() % 8), random.uniform(0, flip_within_s)};
+        if (!only.empty()) {
+          const std::string& one = only[random.next() % only.size()];
+          const std::uint32_t bytes = parts.bytes(one);
+          if (bytes == 0) wire::pc::refuse("--part: there is no " + one + "; the table of all flips has them.");
+          flip.address = parts.address(one, static_cast<std::uint32_t>(random.next() % bytes));
+        }
         const Verdict verdict = trial(stand, seconds, flip, calm);
+        const std::string part = parts.short_name(flip.address);
+        auto& [bytes, tally] = by_part[part];
+        bytes = parts.bytes(part);
+        tally.add(verdict);
         sum.add(verdict);
-        if (list && (verdict.became == Became::harmful || list_all))
-          fmt::print(stderr, "{} {} 0x{:08X} bit {} {:.6f}: {} {}{}\n", motor, name_of(scene), flip.address, flip.bit,
-                     flip.after_s, static_cast<int>(verdict.became), verdict.why,
-                     verdict.told_s >= 0 ? fmt::format(", told after {:.4f} s", verdict.told_s) : "");
+        if (list && verdict.became == Became::harmful)
+          fmt::print(stderr, "{}, {}: {} bit {} at {:.6f} s: {}{}\n", motor, name_of(scene),
+                     parts.full_name(flip.address), flip.bit, flip.after_s, verdict.why,
+                     verdict.told_s >= 0 ? fmt::format(", told after {:.3f} s", verdict.told_s) : "");
       }
+      size = all;
     }
-    print_sum(sum, 0);
+    fmt::print("{}", head_line());
+    for (const auto& [name, found] : by_part) fmt::print("{}", line(name, found.first, found.second));
+    print_sum(sum, size);
     return 0;
   });
 }
