@@ -20,13 +20,14 @@ void adc_handler();
 void usb_handler();
 void systick_handler();
 [[noreturn]] void unexpected_handler();
+
+alignas(h8_15d::Application) unsigned char application_storage[sizeof(h8_15d::Application)];
 }
 
 namespace {
 
 using namespace h8_15d;
 
-alignas(Application) unsigned char application_storage[sizeof(Application)];
 /// No pointer to it: a flipped one would let every interrupt work on what is none. Not before it is built.
 Application& application() { return *std::launder(reinterpret_cast<Application*>(application_storage)); }
 

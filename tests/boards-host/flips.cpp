@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// F19: flips one bit of the firmware's Driver, any bit of any byte, at a random instant on a simulated board whose axes
-// both work near their limits (a push, a stall, a walk) or are disarmed and spoken to all the same. Each flip is a
-// forked trial beside one that nothing happens to; then the host falls silent (flip_judge.hpp: what may become of it).
+// F19: flips one bit of the firmware's Driver, any bit of any byte, at a random instant on a simulated board. Each flip
+// is a forked trial beside one that nothing happens to; then the host falls silent (flip_campaign.hpp).
 //
 // The host's object stands for the chip's: its sizes are 64 bits where those of the chip are 32. A flip comes between
 // two PWM periods, so never into the middle of a tick; on the chip the slow lane works for 1.4 of its 10 ms at least
-// (both axes, 235,000 instructions at 168 MHz), and what flips in a state that it works on may be taken for its result.
+// (both axes, 235,000 instructions at 168 MHz), and what flips in a state that it works on may be taken for its result:
+// for that, and for the rest of the image's memory, see tests/chip/image_flips.cpp.
 #include <fmt/format.h>
 #include <sys/time.h>
 #include <sys/wait.h>
@@ -19,7 +19,7 @@
 #include <functional>
 #include <map>
 
-#include "tests/boards-host/flip_judge.hpp"
+#include "tests/boards-host/flip_campaign.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 
@@ -96,56 +96,58 @@ Seen watched(Stand& s, double seconds, const Seen* calm) {
   s.host_alive = false;
   const double silent_from_s = s.time_s();
   while (s.time_s() < silent_from_s + silent_s) period();
-  return judge.ended(now, {now[0].on, now[1].on});
+  return judge.ended(now);
 }
 
-struct Flip {
-  std::size_t byte;
-  unsigned bit;
-};
-
-/// Without a flip: what is seen is the calm that others are held against.
-Verdict trial(Stand& stand, double seconds, const Flip* flip, Seen& calm) {
-  const auto play = [&] {
-    std::signal(SIGPROF, look_for_a_hang);
-    const itimerval beat{{0, hang_us}, {0, hang_us}};
-    setitimer(ITIMER_PROF, &beat, nullptr);
-    if (flip != nullptr)
-      reinterpret_cast<unsigned char*>(&*stand.driver)[flip->byte] ^= static_cast<unsigned char>(1u << flip->bit);
-    return watched(stand, seconds, flip == nullptr ? nullptr : &calm);
-  };
-  Seen seen;
-  int status = 0;
-  if (!play_forked<Seen>(play, seen, status)) {
-    if (WIFEXITED(status) && WEXITSTATUS(status) == hung) return {Became::watchdog, "hangs"};
-    return {Became::harmful, fmt::format("crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
+class Board : public Victim {
+ public:
+  Board(const Scenery& scenery, Random& random, double seconds)
+      : stand_(scenery.design, scenery.seed), seconds_(seconds) {
+    stand_.arms = scenery.arms;
+    const double instant_s = scenery.design.fault_s + random.uniform(0, 1);
+    while (stand_.time_s() < instant_s) stand_.step();
   }
-  if (flip == nullptr) calm = seen;
-  return verdict_of(seen, calm);
-}
 
-/// A part of the object; the first that holds a byte gives it its name.
-struct Part {
-  std::string name;
-  std::size_t at, bytes;
-  bool holds(std::size_t byte) const { return byte >= at && byte < at + bytes; }
-};
-
-/// The last one is all of it.
-std::vector<Part> parts_of(const firmware::Driver& driver) {
-  std::vector<Part> parts;
-  const auto offset = [&driver](const void* at) {
-    return static_cast<std::size_t>(static_cast<const char*>(at) - reinterpret_cast<const char*>(&driver));
-  };
-  for (int a = 0; a < axes; ++a) {
-    firmware::AxisProbe::name_parts(driver.axis(a), [&](const char* name, const void* at, std::size_t bytes) {
-      parts.push_back({name, offset(at), bytes});
-    });
+  std::vector<Part> parts() const override {
+    const firmware::Driver& driver = *stand_.driver;
+    std::vector<Part> parts;
+    const auto offset = [&driver](const void* at) {
+      return static_cast<std::size_t>(static_cast<const char*>(at) - reinterpret_cast<const char*>(&driver));
+    };
+    for (int a = 0; a < axes; ++a) {
+      firmware::AxisProbe::name_parts(driver.axis(a), [&](const char* name, const void* at, std::size_t bytes) {
+        parts.push_back({name, name, offset(at), bytes});
+      });
+    }
+    parts.push_back({"board_heat_", "board_heat_", offset(&driver.board_heat()), sizeof driver.board_heat()});
+    parts.push_back({"the rest", "the rest", 0, sizeof driver});
+    return parts;
   }
-  parts.push_back({"board_heat_", offset(&driver.board_heat()), sizeof driver.board_heat()});
-  parts.push_back({"the rest", 0, sizeof driver});
-  return parts;
-}
+
+  Verdict trial(const Flip* flip) override {
+    const auto play = [&] {
+      std::signal(SIGPROF, look_for_a_hang);
+      const itimerval beat{{0, hang_us}, {0, hang_us}};
+      setitimer(ITIMER_PROF, &beat, nullptr);
+      if (flip != nullptr)
+        reinterpret_cast<unsigned char*>(&*stand_.driver)[flip->byte] ^= static_cast<unsigned char>(1u << flip->bit);
+      return watched(stand_, seconds_, flip == nullptr ? nullptr : &calm_);
+    };
+    Seen seen;
+    int status = 0;
+    if (!play_forked<Seen>(play, seen, status)) {
+      if (WIFEXITED(status) && WEXITSTATUS(status) == hung) return {Became::watchdog, "hangs"};
+      return {Became::harmful, fmt::format("crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
+    }
+    if (flip == nullptr) calm_ = seen;
+    return verdict_of(seen, calm_);
+  }
+
+ private:
+  Stand stand_;
+  double seconds_;
+  Seen calm_;
+};
 
 }  // namespace
 
@@ -153,70 +155,11 @@ int main(int argc, char** argv) {
   CLI::App app{"F19: what becomes of single flipped bits in the firmware's state, on simulated boards"};
   wire::pc::use_help(app, "flips --help");
   app.footer(examples);
-  int flips = 3000, motor_count = 3, at_once = 20;
-  double seconds = 10, least = -1;
-  std::uint64_t seed = 1000;
-  std::vector<std::string> only;
-  bool list = false;
-  app.add_option("--flips", flips, "how many")->capture_default_str()->check(wire::pc::between(1, 1e6));
-  app.add_option("--seconds", seconds, "simulated after each")
-      ->capture_default_str()
-      ->check(wire::pc::between(0.6, 1e3));
-  app.add_option("--motors", motor_count, "1: only the small one, whose winding warms soonest")
-      ->capture_default_str()
-      ->check(wire::pc::between(1, 3));
-  app.add_option("--seed", seed, "of everything drawn")->capture_default_str()->check(wire::pc::between(0, 1e15));
-  app.add_option("--part", only, "only bytes of these members");
-  app.add_flag("--list", list, "each flip that did harm, on standard error");
-  app.add_option("--check", least, "end with an error when a smaller share is detected or harmless");
+  Options options{.flips = 3000, .at_once = 20, .seconds = 10};
+  options.add_to(app);
   return wire::pc::run_program(app, argc, argv, [&] {
-    Random random(seed);
-    std::map<std::string, std::pair<std::size_t, Tally>> by_part;
-    Tally sum;
-    std::size_t size = 0;
-    for (int n = 0; n < flips;) {
-      const Scenes scene = std::array{push, stall, walk, stall}[random.next() % 4];
-      const char* const motor = motors[random.next() % static_cast<unsigned>(motor_count)];
-      Design design = design_of(motor, scene, 1e6, random);
-      tell_the_truth(design);
-      if (design.scene.demands.size() < axes) {
-        design.scene.demands.push_back(design.scene.demands[0]);
-        design.scene.demands[1].axis = 1;
-      }
-      Stand stand(design, random.next());
-      stand.arms = scene != stall || random.next() % 4 != 0;
-      const double instant_s = design.fault_s + random.uniform(0, 1);
-      while (stand.time_s() < instant_s) stand.step();
-
-      const std::vector<Part> parts = parts_of(*stand.driver);
-      size = parts.back().bytes;
-      std::vector<Part> chosen;
-      for (const Part& p : parts) {
-        if (std::find(only.begin(), only.end(), p.name) != only.end()) chosen.push_back(p);
-      }
-      if (only.empty()) chosen = {parts.back()};
-      if (chosen.empty()) wire::pc::refuse("--part: there is no such member; the table of all flips has them.");
-      Seen calm;
-      const Verdict without = trial(stand, seconds, nullptr, calm);
-      if (without.became == Became::harmful) throw std::runtime_error("without a flip: " + without.why);
-      for (int k = 0; k < at_once && n < flips; ++k, ++n) {
-        const Part& one = chosen[random.next() % chosen.size()];
-        const Flip flip = {one.at + random.next() % one.bytes, static_cast<unsigned>(random.next() % 8)};
-        const auto holds = [&flip](const Part& p) { return p.holds(flip.byte); };
-        const Part& part = *std::find_if(parts.begin(), parts.end(), holds);
-        const Verdict verdict = trial(stand, seconds, &flip, calm);
-        auto& [bytes, tally] = by_part[part.name];
-        bytes = part.bytes;
-        tally.add(verdict);
-        sum.add(verdict);
-        if (list && verdict.became == Became::harmful)
-          fmt::print(stderr, "{}, {}{}: {} + {} bit {}: {}{}\n", motor, name_of(scene), stand.arms ? "" : " disarmed",
-                     part.name, flip.byte - part.at, flip.bit, verdict.why,
-                     verdict.told_s >= 0 ? fmt::format(", told after {:.3f} s", verdict.told_s) : "");
-      }
-    }
-    fmt::print("{}", head_line());
-    for (const auto& [name, found] : by_part) fmt::print("{}", line(name, found.first, found.second));
-    return print_sum(sum, size) < least ? 1 : 0;
+    return run_campaign(options, [&](const Scenery& scenery, Random& random) {
+      return std::make_unique<Board>(scenery, random, options.seconds);
+    });
   });
 }

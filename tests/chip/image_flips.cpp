@@ -1,29 +1,33 @@
 // SPDX-License-Identifier: MIT
 // F19 on the flash image: flips one bit anywhere in its RAM, stack included, at a random instant, executed on the chip
-// model while both axes work near their limits and a host speaks over USB. The core is stopped between two blocks of
-// instructions wherever it is: asleep, in a tick, in the middle of the slow lane. Each flip is a forked trial beside
-// one that nothing happens to; then the host falls silent (tests/boards-host/flip_judge.hpp: what may become of it).
+// model while a host speaks over USB. The core is stopped between two blocks of instructions wherever it is: asleep, in
+// a tick, in the middle of the slow lane. Each flip is a forked trial beside one that nothing happens to; then the host
+// falls silent (tests/boards-host/flip_campaign.hpp).
 //
 // A trial is short. Windings begin near their limit, so that a wrong current shows soon; a trial whose estimate has
-// become colder than its winding, beside the run without a flip, goes on until it shows or is made good; one whose
-// memory and motors are again as in that run ends at once. After a reset the host is silent, and the estimate that was
-// kept must be no colder than the winding. Setpoints here age in 20 ms and fade in 20: what a host that falls silent
-// waits for is the same code.
+// become colder, against its winding, than without the flip, goes on until it shows or is made good; one whose memory
+// and motors are again as without the flip ends at once. After a reset the host is silent, and the estimate that was
+// kept must be no colder than F19 allows a winding to be hotter. Setpoints age in 20 ms here and fade in 20.
+//
+// Not seen: flips in registers and in what a board does once in its life (a save, a commit, a supply that falls), and a
+// flip that waits for longer than a trial.
 #include <fmt/format.h>
 #include <sys/wait.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <map>
-#include <memory>
-#include <optional>
 
 #include "boards/h8-15d/board.hpp"
 #include "boards/host/chip/cable.hpp"
 #include "boards/host/usbip/transfers.hpp"
-#include "tests/boards-host/flip_judge.hpp"
+#include "tests/boards-host/flip_campaign.hpp"
+#include "wire/framer.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 #include "wire/protocol.hpp"
@@ -31,28 +35,41 @@
 namespace {
 
 using namespace faults;
+using boards::usb::Transfer;
 using host_sim::Random;
+using host_sim::chip::Chip;
 using host_sim::chip::Core;
 using host_sim::chip::Time;
 using host_sim::chip::to_s;
 
 constexpr float timeout_s = 0.02f, ramp_s = 0.02f;
-constexpr double silent_s = 0.05;               // time-out, ramp, 5 ms of F21 and a slow tick
+constexpr double silent_s = 0.05;               // both, 5 ms of F21 and a slow tick
 constexpr double last_s = 0.05;                 // in which torque is compared
 constexpr double after_trip_s = 0.03;           // an open bridge only cools
 constexpr double after_reset_s = 0.08;          // the image is up, and its estimate has stepped
 constexpr double flip_within_s = 0.01;          // a period of the slow lane: any of its instants
 constexpr double look_s = 0.01;                 // between two looks at the memory
-constexpr double colder_K = 1, longest_s = 4;   // colder than the winding by more: goes on so long at most
-constexpr double too_cold_K = 3;                // after a reset: what F19 allows a winding
-constexpr unsigned cycles_per_instruction = 2;  // wait states are not modelled; so the lanes take twice the time
+constexpr double colder_K = 1, longest_s = 4;   // colder by more: it goes on, but not for ever
+constexpr double too_cold_K = 3;                // after a reset: as F19
+constexpr unsigned cycles_per_instruction = 2;  // wait states and bus are not modelled; 1 is the least
+
+constexpr const char* examples =
+    "Examples:\n"
+    "  image_flips                    3000 flips on three motors: a quarter of an hour\n"
+    "  image_flips --part stage_ link_ --flips 500 --list      only there, and each flip that did harm\n"
+    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
 
 /// The image on its board, and a robot's computer on its USB cable.
-struct ChipStand {
-  /// `on_index`: at power-on, then somebody turns the shaft; else where it stands is known by the Hall switches alone.
-  ChipStand(const Design& its_design, bool on_index, const std::string& elf, std::uint64_t seed)
-      : design(its_design), pcb(plant(design), seed), cable(pcb), host(cable) {
-    pcb.flash_image(elf);
+class Robot {
+ public:
+  /// `on_index`: at power-on, then somebody turns the shaft; else the Hall switches alone say where it stands.
+  Robot(const Scenery& scenery, bool on_index, const std::string& image)
+      : pcb(plant(scenery.design), scenery.seed),
+        design(scenery.design),
+        arms(scenery.arms),
+        cable_(pcb),
+        host_(cable_) {
+    pcb.flash_image(image);
     firmware::AxisSet set{
         firmware::parameters_from(design.known, h8_15d::rating, {static_cast<float>(design.scene.supply_V), 0.0f}),
         firmware::heat_parameters_from(design.known, design.estimator.trust)};
@@ -64,20 +81,22 @@ struct ChipStand {
     pcb.flash_journal({{{warm, {}}, {warm, {}}}, 0.0f});
     pcb.chip.core().set_cycles_per_instruction(cycles_per_instruction);
     for (int a = 0; a < axes; ++a) pcb.bench.load(a) = boards::host::load_of(design.scene.shaft);
-    const auto turn = [&] {
-      for (int a = 0; a < axes; ++a)
-        pcb.bench.motor(a).place(design.scene.shaft.angle_rad / design.truth.pole_pairs, 0);
-    };
-    if (!on_index) turn();
-    pcb.power_on(static_cast<std::uint32_t>(seed));
-    cable.plug(true);
-    if (!host.enumerate() || host.control(0x00, 9, 1, 0, 0).outcome != boards::usb::Outcome::done)
+    if (!on_index) turn_shaft();
+    pcb.power_on(static_cast<std::uint32_t>(scenery.seed));
+    cable_.plug(true);
+    if (!host_.enumerate() || host_.control(0x00, 9, 1, 0, 0).outcome != boards::usb::Outcome::done)
       throw std::runtime_error("the image is no USB device");
-    if (on_index) turn();
-    begin_s = to_s(pcb.chip.now());
+    if (on_index) turn_shaft();
+    begin_s_ = to_s(pcb.chip.now());
+    for (int ms = 0; ms < settled_ms || (arms && !armed()); ++ms) {
+      if (ms == 1000) throw std::runtime_error("the image would not arm:\n" + pcb.chip.report_text());
+      if (arms && ms % 20 == 0) send(wire::Kind::arm, wire::Axes{3});
+      this->ms([] {});
+    }
+    asks_ = true;
   }
 
-  double time_s() const { return to_s(pcb.chip.now()) - begin_s; }
+  double time_s() const { return to_s(pcb.chip.now()) - begin_s_; }
 
   /// One millisecond, in steps of a packet or two; `each` after each.
   template <class Each>
@@ -88,81 +107,77 @@ struct ChipStand {
     }
     if (host_alive) speak();
     const double until_s = time_s() + 1e-3;
-    std::vector<boards::usb::Transfer> finished;
+    std::vector<Transfer> finished;
     while (time_s() < until_s) {
-      host.turn(finished);
-      for (const boards::usb::Transfer& t : finished) hear(t);
+      host_.turn(finished);
+      for (const Transfer& t : finished) hear(t);
       finished.clear();
       each();
     }
   }
 
-  bool arm() {
-    for (int k = 0; k < 1000; ++k) {
-      if (k % 20 == 0) send(wire::Kind::arm, wire::Axes{3});
-      ms([] {});
-      if (armed(0) && armed(1)) return asks = true;
-    }
-    return false;
-  }
-
-  bool armed(int axis) const { return heard.axis[axis].mode == 1 || heard.axis[axis].mode == 2; }
+  const wire::AxisReport& said(int axis) const { return heard_.axis[axis]; }
   std::uint8_t* ram() { return pcb.chip.core().ram(); }
-  std::uint32_t ram_end() const { return pcb.chip.symbol("bss_end"); }
-  h8_15d::Door door() {
+  std::uint32_t ram_bytes() const { return pcb.chip.symbol("bss_end") - Core::ram_base; }
+  h8_15d::Door door() {  // as it stands there, whatever flipped
     h8_15d::Door d;
     std::memcpy(static_cast<void*>(&d), ram() + (pcb.chip.symbol("door") - Core::ram_base), sizeof d);
     return d;
   }
   /// How much colder the estimate is than the winding.
   double cold_by_K(int axis) {
-    const float(&core)[3] = door().axis[axis].core_degC;
-    const double hottest = static_cast<double>(std::max({core[0], core[1], core[2]}));
-    const double by_K = pcb.bench.truth(axis).hottest_degC - hottest;
+    const float(&core_degC)[3] = door().axis[axis].core_degC;
+    const double by_K =
+        pcb.bench.truth(axis).hottest_degC - static_cast<double>(std::max({core_degC[0], core_degC[1], core_degC[2]}));
     return std::isfinite(by_K) ? by_K : 1e9;
   }
 
-  Design design;
   boards::Pcb pcb;
-  boards::Cable cable;
-  boards::usb::Transfers host;
-  bool host_alive = true, asks = false;
-  double begin_s = 0;
-  wire::State heard{};
+  const Design design;
+  const bool arms;
+  bool host_alive = true;
 
  private:
+  static constexpr int settled_ms = 50;
   static host_sim::BenchDesign plant(const Design& d) {
     host_sim::BenchDesign plant = boards::host::bench_of(d.scene, d.truth);
     plant.sensors = boards::h8_15d_sensors();
     return plant;
   }
+  void turn_shaft() {
+    for (int a = 0; a < axes; ++a) pcb.bench.motor(a).place(design.scene.shaft.angle_rad / design.truth.pole_pairs, 0);
+  }
+  bool armed() const {
+    const auto is = [this](int a) { return said(a).mode == 1 || said(a).mode == 2; };  // ready, running
+    return is(0) && is(1);
+  }
   template <class Payload>
   void send(wire::Kind kind, const Payload& payload) {
-    boards::usb::Transfer out;
+    Transfer out;
     out.endpoint = 1;
     out.bytes.resize(wire::max_encoded);
     out.bytes.resize(wire::encode(
         {static_cast<std::uint8_t>(kind), ++sequence_, sizeof payload, reinterpret_cast<const std::uint8_t*>(&payload)},
         out.bytes.data(), out.bytes.size()));
-    host.submit(std::move(out));
+    host_.submit(std::move(out));
     ++sending_;
   }
   void speak() {
     if (!listening_) {
-      boards::usb::Transfer in;
+      Transfer in;
       in.endpoint = 1;
       in.in = true;
       in.wanted = 512;
-      host.submit(in);
+      host_.submit(std::move(in));
       listening_ = true;
     }
-    if (sending_ > 2) return;
+    if (sending_ > 2) return;  // the board does not take them
     wire::Setpoints wish{3, {}, 0, {0, 0}, {0, 0}};
-    for (int a = 0; asks && a < axes; ++a)
+    for (int a = 0; asks_ && a < axes; ++a)
       wish.q[a] = static_cast<float>(boards::host::demand_A(design.scene, a, time_s()));
     send(wire::Kind::setpoint, wish);
   }
-  void hear(const boards::usb::Transfer& t) {
+  void hear(const Transfer& t) {
     if (!t.in) {
       --sending_;
       return;
@@ -171,92 +186,51 @@ struct ChipStand {
     for (const std::uint8_t byte : t.bytes) {
       if (!reader_.take(byte)) continue;
       const wire::Frame& f = reader_.frame();
-      if (f.kind == wire::reply_to(wire::Kind::setpoint) && f.bytes >= sizeof heard)
-        std::memcpy(static_cast<void*>(&heard), f.payload, sizeof heard);
+      if (f.kind == wire::reply_to(wire::Kind::setpoint) && f.bytes >= sizeof heard_)
+        std::memcpy(static_cast<void*>(&heard_), f.payload, sizeof heard_);
     }
   }
 
+  boards::Cable cable_;
+  boards::usb::Transfers host_;
   wire::FrameReader reader_;
+  wire::State heard_{};
   std::uint8_t sequence_ = 0;
   int sending_ = 0;
-  bool listening_ = false;
+  bool listening_ = false, asks_ = false;
+  double begin_s_ = 0;
 };
 
-struct Flip {
-  std::uint32_t address;
-  unsigned bit;
-  double after_s;
-};
-
-/// What lies where in the RAM, by the image's symbol table (boards/h8-15d/parts.cpp).
-class Parts {
- public:
-  Parts(const host_sim::chip::Chip& chip, std::uint32_t stack_left_bytes) {
-    const std::string mark = "part ";
-    std::uint32_t application = 0;
-    for (const auto& [name, address] : chip.symbols()) {
-      if (name.find("application_storage") != std::string::npos) application = address;
-    }
-    for (const auto& [name, offset] : chip.symbols()) {
-      if (name.starts_with(mark)) begins_[application + offset] = name.substr(mark.size());
-    }
-    if (begins_.empty()) throw std::runtime_error("the image does not name its parts; build it anew");
-    begins_[Core::ram_base] = "stack, never reached";
-    begins_[Core::ram_base + stack_left_bytes] = "stack";
-    begins_[chip.symbol("stack_top")] = "library";
-    begins_[chip.symbol("door")] = "door";
-    begins_[chip.symbol("door") + sizeof(h8_15d::Door)] = "library";
-    begins_[chip.symbol("bss_end")] = "nothing";
+/// What lies where in the RAM, by the image's symbol table (boards/h8-15d/parts.cpp). In the table the members of both
+/// axes are one, others go by what they belong to.
+std::vector<Part> parts_of(Robot& robot) {
+  const Chip& chip = robot.pcb.chip;
+  const std::string mark = "part ", axis = "driver_.axes_[";
+  const auto offset = [&chip](const char* symbol) { return chip.symbol(symbol) - Core::ram_base; };
+  std::map<std::size_t, std::string> begins;
+  for (const auto& [name, value] : chip.symbols()) {
+    if (name.starts_with(mark)) begins[offset("application_storage") + value] = name.substr(mark.size());
   }
-
-  std::string full_name(std::uint32_t address) const {
-    const auto part = std::prev(begins_.upper_bound(address));
-    return fmt::format("{} + {}", part->second, address - part->first);
+  if (begins.empty()) throw std::runtime_error("the image does not name its parts");
+  begins[0] = "stack, never reached";
+  begins[robot.door().stack_left_bytes] = "stack";
+  begins[offset("stack_top")] = "toolchain";
+  begins[offset("door")] = "door";
+  begins[offset("door") + sizeof(h8_15d::Door)] = "toolchain";
+  std::vector<Part> parts;
+  for (auto one = begins.begin(); one != begins.end(); ++one) {
+    const auto next = std::next(one);
+    const std::string& full = one->second;
+    const bool of_axis = full.starts_with(axis);
+    parts.push_back({of_axis ? "axis " + full.substr(axis.size() + 3) : full.substr(0, full.find('.')), full,
+                     one->first, (next == begins.end() ? robot.ram_bytes() : next->first) - one->first});
   }
-  /// As the table has it: members of both axes as one, others by what they belong to.
-  std::string short_name(std::uint32_t address) const {
-    return shortened(std::prev(begins_.upper_bound(address))->second);
-  }
-  std::uint32_t bytes(const std::string& short_name) const {
-    std::uint32_t sum = 0;
-    for (auto part = begins_.begin(); std::next(part) != begins_.end(); ++part) {
-      if (shortened(part->second) == short_name) sum += std::next(part)->first - part->first;
-    }
-    return sum;
-  }
-  /// The n-th byte of all that have this name.
-  std::uint32_t address(const std::string& short_name, std::uint32_t n) const {
-    for (auto part = begins_.begin(); std::next(part) != begins_.end(); ++part) {
-      const std::uint32_t bytes = std::next(part)->first - part->first;
-      if (shortened(part->second) != short_name) continue;
-      if (n < bytes) return part->first + n;
-      n -= bytes;
-    }
-    return 0;
-  }
-
- private:
-  static std::string shortened(const std::string& name) {
-    const std::string axis = "driver_.axes_[";
-    if (name.starts_with(axis)) return "axis " + name.substr(axis.size() + 3);
-    return name.substr(0, name.find('.'));
-  }
-  std::map<std::uint32_t, std::string> begins_;
-};
-
-/// What the run without a flip looked like: at each look the memory that is in use, and the motors.
-struct Calm {
-  struct Look {
-    std::uint64_t print;
-    double cold_K[axes];
-  };
-  Seen seen;
-  Look looks[100];
-  std::size_t count = 0;
-};
+  parts.push_back({"all", "all", 0, robot.ram_bytes()});
+  return parts;
+}
 
 /// Of memory, motors and time. Below the stack pointer nothing is in use.
-std::uint64_t print_of(ChipStand& s) {
+std::uint64_t print_of(Robot& robot) {
   std::uint64_t sum = 0xCBF29CE484222325;  // FNV-1a, by words
   const auto add = [&sum](const void* from, std::size_t bytes) {
     for (std::size_t at = 0; at + 4 <= bytes; at += 4) {
@@ -265,13 +239,13 @@ std::uint64_t print_of(ChipStand& s) {
       sum = (sum ^ word) * 0x100000001B3;
     }
   };
-  const std::uint32_t from = s.pcb.chip.core().stack_pointer(), end = s.ram_end();
-  if (from < Core::ram_base || from > end) return 0;
-  add(s.ram() + (from - Core::ram_base), end - from);
-  const Time now = s.pcb.chip.now();
+  const std::uint32_t used_from = robot.pcb.chip.core().stack_pointer() - Core::ram_base;
+  if (used_from > robot.ram_bytes()) return 0;
+  add(robot.ram() + used_from, robot.ram_bytes() - used_from);
+  const Time now = robot.pcb.chip.now();
   add(&now, sizeof now);
   for (int a = 0; a < axes; ++a) {
-    const host_sim::AxisTruth truth = s.pcb.bench.truth(a);
+    const host_sim::AxisTruth truth = robot.pcb.bench.truth(a);
     add(truth.current_A.data(), sizeof truth.current_A);
     add(truth.phase_degC.data(), sizeof truth.phase_degC);
     add(&truth.angle_rad, sizeof truth.angle_rad);
@@ -279,167 +253,165 @@ std::uint64_t print_of(ChipStand& s) {
   return sum;
 }
 
-/// Runs on for `seconds`, then without a host. Without a flip it fills `calm`.
-Seen watched(ChipStand& s, double seconds, const Flip* flip, Calm& calm) {
-  FlipJudge judge(s.design, s.asks, flip == nullptr ? nullptr : &calm.seen);
-  host_sim::chip::Chip& chip = s.pcb.chip;
-  const double from_s = s.time_s();
-  const int resets = chip.resets();
-  bool flipped = false;
-  if (flip != nullptr) {
-    chip.at(chip.now() + host_sim::chip::from_s(flip->after_s), [&] {
-      s.ram()[flip->address - Core::ram_base] ^= static_cast<std::uint8_t>(1u << flip->bit);
-      flipped = true;
-    });
-  }
-  const double flip_s = from_s + (flip != nullptr ? flip->after_s : 0);
-  AxisView now[axes];
-  double seen_s = from_s, to_s = from_s + seconds, off_s = 0;
-  bool reset = false;
-  const auto look = [&] {
-    const double dt_s = s.time_s() - seen_s;
-    seen_s = s.time_s();
-    bool off = true, tripped = false;
-    for (int a = 0; a < axes; ++a) {
-      const wire::AxisReport& said = s.heard.axis[a];
-      const bool on = !s.pcb.gates_open(a);
-      now[a] = {s.pcb.bench.truth(a), on, on != s.asks, said.mode == 3, said.limit != 0, said.estimate_flags};
-      off = off && !on;
-      tripped = tripped || now[a].tripped;
-    }
-    off_s = off ? off_s + dt_s : 0;
-    if (s.host_alive && !reset && (chip.resets() != resets || chip.core().locked_up())) {
-      reset = true;
-      to_s = s.time_s() + after_reset_s;
-    }
-    if (tripped) to_s = std::min(to_s, s.time_s() + after_trip_s);
-    judge.see(now, s.pcb.bench.power_stage_degC(), s.time_s(), s.time_s() - flip_s, dt_s, s.host_alive && !reset,
-              s.time_s() > to_s - last_s);
+/// What was seen without a flip, and at each look the print and how cold the estimates were; crosses a pipe.
+struct Calm {
+  struct Look {
+    std::uint64_t print;
+    double cold_K[axes];
   };
-  std::size_t looks = 0;
-  double next_s = from_s + look_s;
-  while (s.time_s() < to_s) {
-    s.host_alive = !reset;
-    s.ms(look);
-    if (s.time_s() < next_s) continue;
-    next_s += look_s;
-    Calm::Look found = {print_of(s), {s.cold_by_K(0), s.cold_by_K(1)}};
-    if (flip == nullptr) {
-      if (looks < std::size(calm.looks)) calm.looks[calm.count = looks++] = found;
-      continue;
-    }
-    const Calm::Look& then = calm.looks[std::min(looks++, calm.count)];
-    if (flipped && looks <= calm.count && found.print == then.print) {
-      Seen same = calm.seen;
-      same.same = true;
-      return same;
-    }
-    const bool colder = found.cold_K[0] > then.cold_K[0] + colder_K || found.cold_K[1] > then.cold_K[1] + colder_K;
-    if (colder && !reset && !judge.told())
-      to_s = std::min(std::max(to_s, s.time_s() + 1.5 * look_s), from_s + longest_s);
-  }
-  std::string mistake;
-  if (reset) {
-    for (int a = 0; a < axes; ++a) {
-      if (s.cold_by_K(a) > too_cold_K)
-        mistake = fmt::format("axis {}: {:.1f} K too cold after a reset", a, s.cold_by_K(a));
-    }
-  }
-  s.host_alive = false;
-  const double silent_from_s = s.time_s();
-  off_s = 0;
-  while (s.time_s() < silent_from_s + silent_s) s.ms(look);
-  Seen seen = judge.ended(now, {!s.pcb.gates_open(0), !s.pcb.gates_open(1)});
-  seen.watchdog = reset;
-  for (const host_sim::chip::Trouble& t : chip.troubles().list()) {
-    if (t.what.find("both switches") != std::string::npos) mistake = t.what;
-  }
-  std::snprintf(seen.mistake, sizeof seen.mistake, "%s", mistake.c_str());
-  return seen;
-}
-
-Verdict trial(ChipStand& stand, double seconds, const Flip& flip, Calm& calm) {
   Seen seen;
-  int status = 0;
-  if (!play_forked<Seen>([&] { return watched(stand, seconds, &flip, calm); }, seen, status))
-    return {Became::harmful, fmt::format("the model crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
-  return verdict_of(seen, calm.seen);
-}
+  std::array<Look, 20> looks;
+  std::size_t count = 0;
+};
+
+/// One trial; the process that plays it ends with it.
+class Trial {
+ public:
+  Trial(Robot& robot, const Seen* calm)
+      : robot_(robot),
+        chip_(robot.pcb.chip),
+        judge_(robot.design, robot.arms, calm),
+        resets_(chip_.resets()),
+        from_s_(robot.time_s()),
+        seen_s_(from_s_) {}
+
+  Calm without_a_flip(double seconds) {
+    Calm calm;
+    to_s_ = from_s_ + seconds;
+    while (look()) {
+      if (calm.count < calm.looks.size()) calm.looks[calm.count++] = now();
+    }
+    calm.seen = silent();
+    return calm;
+  }
+
+  Seen with(const Flip& flip, double after_s, double seconds, const Calm& calm) {
+    flip_s_ = from_s_ + after_s;
+    to_s_ = from_s_ + seconds;
+    chip_.at(chip_.now() + host_sim::chip::from_s(after_s),
+             [&] { robot_.ram()[flip.byte] ^= static_cast<std::uint8_t>(1u << flip.bit); });
+    for (std::size_t n = 0; look(); ++n) {
+      const Calm::Look here = now(), &there = calm.looks[std::min(n, calm.count - 1)];
+      if (n < calm.count && robot_.time_s() > flip_s_ && here.print == there.print) {
+        Seen same = calm.seen;
+        same.same = true;
+        return same;
+      }
+      const bool colder = here.cold_K[0] > there.cold_K[0] + colder_K || here.cold_K[1] > there.cold_K[1] + colder_K;
+      if (colder && !reset_ && !judge_.told())
+        to_s_ = std::min(std::max(to_s_, robot_.time_s() + 1.5 * look_s), from_s_ + longest_s);
+    }
+    return silent();
+  }
+
+ private:
+  /// Runs until the next look. False: the host's time is over.
+  bool look() {
+    const double next_s = robot_.time_s() + look_s - 0.5e-3;
+    while (robot_.time_s() < next_s) {
+      if (robot_.time_s() >= to_s_) return false;
+      robot_.ms([this] { see(); });
+    }
+    return true;
+  }
+  Calm::Look now() { return {print_of(robot_), {robot_.cold_by_K(0), robot_.cold_by_K(1)}}; }
+
+  void see() {
+    const double now_s = robot_.time_s(), dt_s = now_s - seen_s_;
+    seen_s_ = now_s;
+    for (int a = 0; a < axes; ++a) {
+      const wire::AxisReport& said = robot_.said(a);
+      const bool on = !robot_.pcb.gates_open(a);
+      view_[a] = {robot_.pcb.bench.truth(a), on, on != robot_.arms, said.mode == 3, said.limit != 0,
+                  said.estimate_flags};
+      if (view_[a].tripped) to_s_ = std::min(to_s_, now_s + after_trip_s);
+    }
+    if (!reset_ && chip_.resets() != resets_) {
+      reset_ = true;
+      robot_.host_alive = false;
+      to_s_ = now_s + after_reset_s;
+    }
+    judge_.see(view_, robot_.pcb.bench.power_stage_degC(), now_s, now_s - flip_s_, dt_s, robot_.host_alive,
+               now_s > to_s_ - last_s);
+  }
+
+  Seen silent() {
+    std::string mistake;
+    for (int a = 0; reset_ && a < axes; ++a) {
+      if (robot_.cold_by_K(a) > too_cold_K)
+        mistake = fmt::format("axis {}: {:.1f} K too cold after a reset", a, robot_.cold_by_K(a));
+    }
+    robot_.host_alive = false;
+    const double until_s = robot_.time_s() + silent_s;
+    while (robot_.time_s() < until_s) robot_.ms([this] { see(); });
+    if (chip_.troubles().mention("both switches")) mistake = "a bridge is shorted";
+    Seen seen = judge_.ended(view_);
+    seen.watchdog = reset_;
+    mistake.copy(seen.mistake, sizeof seen.mistake - 1);
+    return seen;
+  }
+
+  Robot& robot_;
+  Chip& chip_;
+  FlipJudge judge_;
+  AxisView view_[axes];
+  int resets_;
+  bool reset_ = false;
+  double from_s_, seen_s_, to_s_ = 0, flip_s_ = 0;
+};
+
+class Image : public Victim {
+ public:
+  Image(const Scenery& scenery, Random& random, double seconds, const std::string& image)
+      : random_(scenery.seed),
+        robot_(scenery, scenery.scene != stall || random.next() % 2 == 0, image),
+        seconds_(seconds) {
+    const double instant_s = robot_.time_s() + scenery.design.fault_s;
+    while (robot_.time_s() < instant_s) robot_.ms([] {});
+  }
+
+  std::vector<Part> parts() const override { return parts_of(robot_); }
+
+  Verdict trial(const Flip* flip) override {
+    int status = 0;
+    if (flip == nullptr) {
+      const auto play = [&] { return Trial(robot_, nullptr).without_a_flip(seconds_); };
+      if (!play_forked<Calm>(play, calm_, status) || calm_.seen.told_s >= 0)
+        throw std::runtime_error("without a flip: trips");
+      return verdict_of(calm_.seen, calm_.seen);
+    }
+    const double after_s = random_.uniform(0, flip_within_s);
+    Seen seen;
+    const auto play = [&] { return Trial(robot_, &calm_.seen).with(*flip, after_s, seconds_, calm_); };
+    if (!play_forked<Seen>(play, seen, status))
+      return {Became::harmful, fmt::format("the model crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
+    return verdict_of(seen, calm_.seen);
+  }
+
+ private:
+  Random random_;
+  mutable Robot robot_;  // who looks into its memory changes nothing
+  double seconds_;
+  Calm calm_;
+};
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"F19: what becomes of single flipped bits in the RAM of the flash image"};
-  int flips = 1000, motor_count = 3, at_once = 40;
-  double seconds = 0.12;
-  std::uint64_t seed = 1000;
-  std::string elf = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";
-  app.add_option("--flips", flips);
-  app.add_option("--seconds", seconds);
-  app.add_option("--seed", seed);
-  app.add_option("--motors", motor_count);
-  app.add_option("--image", elf);
-  bool list = false;
-  std::vector<std::string> only;
-  app.add_flag("--list", list);
-  app.add_option("--part", only);
+  CLI::App app{"F19: what becomes of single flipped bits in the memory of the flash image, on the chip model"};
+  wire::pc::use_help(app, "image_flips --help");
+  app.footer(examples);
+  Options options{.flips = 3000, .at_once = 40, .seconds = 0.12};
+  options.add_to(app);
+  std::string image = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";
+  app.add_option("--image", image, "the flash image")->capture_default_str();
   return wire::pc::run_program(app, argc, argv, [&] {
-    Random random(seed);
-    std::map<std::string, std::pair<std::size_t, Tally>> by_part;
-    Tally sum;
-    std::size_t size = 0;
-    for (int n = 0; n < flips;) {
-      const Scenes scene = std::array{push, stall, walk, stall}[random.next() % 4];
-      const char* const motor = motors[random.next() % static_cast<unsigned>(motor_count)];
-      Design design = design_of(motor, scene, 1e6, random);
-      tell_the_truth(design);
-      if (design.scene.demands.size() < axes) {
-        design.scene.demands.push_back(design.scene.demands[0]);
-        design.scene.demands[1].axis = 1;
-      }
-      const bool on_index = scene != stall || random.next() % 2 == 0;
-      ChipStand stand(design, on_index, elf, random.next());
-      if (!stand.arm()) throw std::runtime_error("the image would not arm:\n" + stand.pcb.chip.report_text());
-      const double instant_s = stand.time_s() + design.fault_s;
-      while (stand.time_s() < instant_s) stand.ms([] {});
-      Calm calm;
-      const auto without = [&] {
-        Calm found;
-        found.seen = watched(stand, seconds, nullptr, found);
-        return found;
-      };
-      int status = 0;
-      if (!play_forked<Calm>(without, calm, status)) throw std::runtime_error("without a flip: crashes");
-      const Verdict healthy = verdict_of(calm.seen, calm.seen);
-      if (healthy.became != Became::no_effect)
-        throw std::runtime_error(fmt::format("without a flip: {} {} {}", motor, name_of(scene), healthy.why));
-      const Parts parts(stand.pcb.chip, stand.door().stack_left_bytes);
-      const std::uint32_t all = stand.ram_end() - Core::ram_base;
-      for (int k = 0; k < at_once && n < flips; ++k, ++n) {
-        Flip flip = {Core::ram_base + static_cast<std::uint32_t>(random.next() % all),
-                     static_cast<unsigned>(random.next() % 8), random.uniform(0, flip_within_s)};
-        if (!only.empty()) {
-          const std::string& one = only[random.next() % only.size()];
-          const std::uint32_t bytes = parts.bytes(one);
-          if (bytes == 0) wire::pc::refuse("--part: there is no " + one + "; the table of all flips has them.");
-          flip.address = parts.address(one, static_cast<std::uint32_t>(random.next() % bytes));
-        }
-        const Verdict verdict = trial(stand, seconds, flip, calm);
-        const std::string part = parts.short_name(flip.address);
-        auto& [bytes, tally] = by_part[part];
-        bytes = parts.bytes(part);
-        tally.add(verdict);
-        sum.add(verdict);
-        if (list && verdict.became == Became::harmful)
-          fmt::print(stderr, "{}, {}: {} bit {} at {:.6f} s: {}{}\n", motor, name_of(scene),
-                     parts.full_name(flip.address), flip.bit, flip.after_s, verdict.why,
-                     verdict.told_s >= 0 ? fmt::format(", told after {:.3f} s", verdict.told_s) : "");
-      }
-      size = all;
+    if (!std::filesystem::exists(image)) {
+      fmt::print("skipped: no flash image; cmake --preset h8-15d && cmake --build --preset h8-15d\n");
+      return std::getenv("HOTCORE_ALL") != nullptr ? 1 : 0;
     }
-    fmt::print("{}", head_line());
-    for (const auto& [name, found] : by_part) fmt::print("{}", line(name, found.first, found.second));
-    print_sum(sum, size);
-    return 0;
+    return run_campaign(options, [&](const Scenery& scenery, Random& random) {
+      return std::make_unique<Image>(scenery, random, options.seconds, image);
+    });
   });
 }

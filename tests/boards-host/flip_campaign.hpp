@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// F19: what became of a flipped bit. Sees both axes period by period, whoever plays them (the firmware built for this
-// PC, or the flash image), and holds that against the same run without the flip.
+// F19: a campaign of flipped bits. Draws scenes in which both axes work near their limits (a push, a stall, a walk) or
+// are disarmed and spoken to all the same; sees both axes period by period, whoever plays them (the firmware built for
+// this PC, or the flash image), and holds that against the same run without the flip. What may become of one:
 //
 //   no effect   the plant ended as without the flip, to the last digit
 //   harmless    it did not, but nothing below happened
@@ -12,10 +13,13 @@
 //               bridge still on when the host has been silent for as long as it may be; or the program crashed
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "tests/boards-host/fault_stand.hpp"
 
@@ -50,7 +54,8 @@ class FlipJudge {
   /// `time_s` of the scene, `since_s` the flip. `last`: torque counts for what was lost.
   void see(const AxisView (&now)[axes], double stage_degC, double time_s, double since_s, double dt_s, bool host_alive,
            bool last);
-  Seen ended(const AxisView (&now)[axes], const bool (&still_on)[axes]);
+  /// `now`: when the host has been silent for as long as it may be.
+  Seen ended(const AxisView (&now)[axes]);
   bool told() const { return seen_.told_s >= 0; }
 
  private:
@@ -89,15 +94,48 @@ bool play_forked(const std::function<Found()>& trial, Found& found, int& status)
   return play_forked([&] { return &(theirs = trial()); }, &found, sizeof found, status);
 }
 
-struct Tally {
-  int became[kinds] = {}, soon = 0;  // the latter: detected within the 10 ms of F19
-  int all() const;
-  int of(Became b) const { return became[static_cast<int>(b)]; }
-  void add(const Verdict& v);
+/// The command line of a campaign.
+struct Options {
+  int flips, at_once, motor_count = 3;  // at_once: of the same scene
+  double seconds, least = -1;
+  std::uint64_t seed = 1000;
+  std::vector<std::string> only{};
+  bool list = false;
+  void add_to(CLI::App& app);
 };
-std::string head_line();
-std::string line(const std::string& name, std::size_t bytes, const Tally& tally);
-/// The last lines: shares. Returns the share that is detected or harmless.
-double print_sum(const Tally& sum, std::size_t bytes);
+
+struct Scenery {
+  const char* motor;
+  Scenes scene;
+  Design design;
+  std::uint64_t seed;
+  bool arms;
+};
+
+struct Part {
+  std::string name, full_name;  // the first in the table and for --part
+  std::size_t at, bytes;
+  bool holds(std::size_t byte) const { return byte >= at && byte < at + bytes; }
+};
+
+struct Flip {
+  std::size_t byte;
+  unsigned bit;
+};
+
+/// A board in the middle of a scene; each trial begins there.
+class Victim {
+ public:
+  virtual ~Victim() = default;
+  /// The first that holds a byte gives it its name; the last one is all of it.
+  virtual std::vector<Part> parts() const = 0;
+  /// nullptr, the first time: without a flip; what is seen then is what others are held against.
+  virtual Verdict trial(const Flip* flip) = 0;
+};
+
+/// Flips, and prints the table. The exit code.
+int run_campaign(
+    const Options& options,
+    const std::function<std::unique_ptr<Victim>(const Scenery& scenery, host_sim::Random& random)>& set_up);
 
 }  // namespace faults
