@@ -156,6 +156,19 @@ TEST(Guards, AReferenceThatIsOffByTenPercentOpensTheGates) {  // then every othe
   EXPECT_NEAR(pcb->door().vdda_V, 2.97, 0.01);
 }
 
+TEST(Guards, AFlippedZeroOfAnEncoderOpensItsBridge) {
+  NEEDS_IMAGE(image);
+  for (const int axis : {0, 1}) {
+    auto pcb = driving();
+    const std::uint32_t zero = pcb->chip.symbol("application_storage") + pcb->chip.symbol("part stage_.encoder_zero_") +
+                               4 * static_cast<std::uint32_t>(axis);
+    pcb->chip.core().ram()[zero + 1 - Core::ram_base] ^= 4;  // a quarter of a turn
+    hold(*pcb, 4.0f, 4.0f, 0.01);
+    EXPECT_FALSE(pcb->duty(axis).on);
+    EXPECT_TRUE(pcb->duty(1 - axis).on);
+  }
+}
+
 TEST(Guards, AnEncoderThatLostCountsIsFoundAtTheIndex) {
   NEEDS_IMAGE(image);
   Options o;
