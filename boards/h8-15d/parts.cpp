@@ -52,6 +52,16 @@ namespace h8_15d {
   AXES(quiet_rad_per_s_per_V_);
   AXES(offset_bound_A_);
   AXES(core_);
+  AXES(core_.uncertainty_);
+  AXES(core_.degC_);
+  AXES(core_.good_degC_);
+  AXES(core_.ambient_degC_);
+  AXES(core_.input_);
+  AXES(core_.due_K_);
+  AXES(core_.watch_);
+  AXES(core_.doubted_K_);
+  AXES(core_.estimate_);
+  AXES(core_.built_);
   AXES(governor_);
   AXES(endurance_);
   AXES(looked_);

@@ -191,7 +191,8 @@ int run_campaign(const Options& o,
     sum.bytes = parts.back().bytes;
     std::vector<Part> chosen;
     for (const Part& p : parts) {
-      if (std::find(o.only.begin(), o.only.end(), p.name) != o.only.end()) chosen.push_back(p);
+      const auto means = [&p](const std::string& one) { return p.name == one || p.full_name.ends_with(one); };
+      if (std::any_of(o.only.begin(), o.only.end(), means)) chosen.push_back(p);
     }
     if (o.only.empty()) chosen = {parts.back()};
     if (chosen.empty()) wire::pc::refuse("--part: there is no such part; the table of all flips has them.");

@@ -57,6 +57,7 @@ constexpr const char* examples =
     "Examples:\n"
     "  image_flips                    3000 flips on three motors: a quarter of an hour\n"
     "  image_flips --part stage_ link_ --flips 500 --list      only there, and each flip that did harm\n"
+    "  image_flips --part core_.degC_ --inside CoreEstimator   in the middle of the slow lane\n"
     "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
 
 /// The image on its board, and a robot's computer on its USB cable.
@@ -222,8 +223,9 @@ std::vector<Part> parts_of(Robot& robot) {
     const auto next = std::next(one);
     const std::string& full = one->second;
     const bool of_axis = full.starts_with(axis);
-    parts.push_back({of_axis ? "axis " + full.substr(axis.size() + 3) : full.substr(0, full.find('.')), full,
-                     one->first, (next == begins.end() ? robot.ram_bytes() : next->first) - one->first});
+    const std::string member = of_axis ? full.substr(axis.size() + 3) : full;
+    parts.push_back({(of_axis ? "axis " : "") + member.substr(0, member.find('.')), full, one->first,
+                     (next == begins.end() ? robot.ram_bytes() : next->first) - one->first});
   }
   parts.push_back({"all", "all", 0, robot.ram_bytes()});
   return parts;
@@ -266,6 +268,8 @@ struct Calm {
 
 /// One trial; the process that plays it ends with it.
 class Trial {
+  static constexpr Time step = host_sim::chip::ticks_per_s / 1'000'000;  // of waiting for a function
+
  public:
   Trial(Robot& robot, const Seen* calm)
       : robot_(robot),
@@ -285,14 +289,13 @@ class Trial {
     return calm;
   }
 
-  Seen with(const Flip& flip, double after_s, double seconds, const Calm& calm) {
-    flip_s_ = from_s_ + after_s;
+  /// `inside`: as soon then as the core is in a function whose name holds this.
+  Seen with(const Flip& flip, double after_s, const std::string& inside, double seconds, const Calm& calm) {
     to_s_ = from_s_ + seconds;
-    chip_.at(chip_.now() + host_sim::chip::from_s(after_s),
-             [&] { robot_.ram()[flip.byte] ^= static_cast<std::uint8_t>(1u << flip.bit); });
+    flip_at(chip_.now() + host_sim::chip::from_s(after_s), flip, inside);
     for (std::size_t n = 0; look(); ++n) {
       const Calm::Look here = now(), &there = calm.looks[std::min(n, calm.count - 1)];
-      if (n < calm.count && robot_.time_s() > flip_s_ && here.print == there.print) {
+      if (n < calm.count && flipped_ && here.print == there.print) {
         Seen same = calm.seen;
         same.same = true;
         return same;
@@ -305,6 +308,15 @@ class Trial {
   }
 
  private:
+  void flip_at(Time when, const Flip& flip, const std::string& inside) {
+    chip_.at(when, [this, &flip, &inside] {
+      if (chip_.function_at(chip_.pc()).find(inside) == std::string::npos)
+        return flip_at(chip_.now() + step, flip, inside);
+      flip_s_ = robot_.time_s();
+      flipped_ = true;
+      robot_.ram()[flip.byte] ^= static_cast<std::uint8_t>(1u << flip.bit);
+    });
+  }
   /// Runs until the next look. False: the host's time is over.
   bool look() {
     const double next_s = robot_.time_s() + look_s - 0.5e-3;
@@ -356,16 +368,17 @@ class Trial {
   FlipJudge judge_;
   AxisView view_[axes];
   int resets_;
-  bool reset_ = false;
-  double from_s_, seen_s_, to_s_ = 0, flip_s_ = 0;
+  bool reset_ = false, flipped_ = false;
+  double from_s_, seen_s_, to_s_ = 0, flip_s_ = 1e9;
 };
 
 class Image : public Victim {
  public:
-  Image(const Scenery& scenery, Random& random, double seconds, const std::string& image)
+  Image(const Scenery& scenery, Random& random, double seconds, const std::string& inside, const std::string& image)
       : random_(scenery.seed),
         robot_(scenery, scenery.scene != stall || random.next() % 2 == 0, image),
-        seconds_(seconds) {
+        seconds_(seconds),
+        inside_(inside) {
     const double instant_s = robot_.time_s() + scenery.design.fault_s;
     while (robot_.time_s() < instant_s) robot_.ms([] {});
   }
@@ -382,7 +395,7 @@ class Image : public Victim {
     }
     const double after_s = random_.uniform(0, flip_within_s);
     Seen seen;
-    const auto play = [&] { return Trial(robot_, &calm_.seen).with(*flip, after_s, seconds_, calm_); };
+    const auto play = [&] { return Trial(robot_, &calm_.seen).with(*flip, after_s, inside_, seconds_, calm_); };
     if (!play_forked<Seen>(play, seen, status))
       return {Became::harmful, fmt::format("the model crashes, signal {}", WIFSIGNALED(status) ? WTERMSIG(status) : 0)};
     return verdict_of(seen, calm_.seen);
@@ -392,6 +405,7 @@ class Image : public Victim {
   Random random_;
   mutable Robot robot_;  // who looks into its memory changes nothing
   double seconds_;
+  std::string inside_;
   Calm calm_;
 };
 
@@ -403,7 +417,8 @@ int main(int argc, char** argv) {
   app.footer(examples);
   Options options{.flips = 3000, .at_once = 40, .seconds = 0.12};
   options.add_to(app);
-  std::string image = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";
+  std::string inside, image = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";
+  app.add_option("--inside", inside, "only while the core is in a function whose name holds this");
   app.add_option("--image", image, "the flash image")->capture_default_str();
   return wire::pc::run_program(app, argc, argv, [&] {
     if (!std::filesystem::exists(image)) {
@@ -411,7 +426,7 @@ int main(int argc, char** argv) {
       return std::getenv("HOTCORE_ALL") != nullptr ? 1 : 0;
     }
     return run_campaign(options, [&](const Scenery& scenery, Random& random) {
-      return std::make_unique<Image>(scenery, random, options.seconds, image);
+      return std::make_unique<Image>(scenery, random, options.seconds, inside, image);
     });
   });
 }
