@@ -176,7 +176,9 @@ void CoreEstimator::meet_sensor(float reading_degC) {
 /// The minute is over, and a start that was a guess would contradict the sensor for hours: it is as cold as it reads,
 /// with what is left as margin.
 void CoreEstimator::doubt(float left_K) {
+  meet_copy();
   degC_.array() -= static_cast<double>(left_K);
+  keep_copy();
   sensor_degC_ -= static_cast<double>(left_K);
   watch_.model_corrected(-left_K);
   doubted_K_.head(n_).array() += left_K;

@@ -9,8 +9,9 @@
 //   watchdog    the program hung, or wrecked itself: a watchdog opens the bridge
 //   harmful     a winding more than 3 K above its limit, or the power stage above its own; or for longer than 10 ms
 //               more than a tenth above the peak current, torque against or beyond the demand; above the trip level
-//               for more than the 100 us of a saturated reading, bridge on; half of the torque lost without a word; a
-//               bridge still on when the host has been silent for as long as it may be; or the program crashed
+//               for more than the 100 us of a saturated reading, bridge on; half of the torque lost without a word (a
+//               limit is one if the current fell with it); a bridge still on when the host has been silent for as long
+//               as it may be; an estimate too cold after a reset; a shorted bridge; or the program crashed
 #pragma once
 
 #include <CLI/CLI.hpp>
