@@ -511,8 +511,9 @@ void CoreEstimator::start_hotter() {
 void CoreEstimator::meet_copy() {
   if (!possible()) return;  // guard_state knows better
   for (int i = 0; i < n_; ++i) {
-    if (degC_[i] == good_degC_[i]) continue;
-    if (degC_[i] < good_degC_[i]) degC_[i] = good_degC_[i];
+    const double copy = good_degC_.data()[i];  // its size is in no sum
+    if (degC_[i] == copy) continue;
+    if (degC_[i] < copy) degC_[i] = copy;
     flags_ |= state_restored;
   }
 }
