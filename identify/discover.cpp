@@ -167,7 +167,8 @@ std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log
   std::vector<Log> sooner = given;
   HoldOut held_sooner = held;
   for (std::vector<Log>* some : {&sooner, &held_sooner.logs})
-    std::transform(some->begin(), some->end(), some->begin(), loaded_before);
+    std::transform(some->begin(), some->end(), some->begin(),
+                   [](const Log& log) { return loaded_before(log, "the temperatures ask it"); });
   Report report = discover(sooner, motor, held_sooner, doing);
   const bool remains =
       std::any_of(report.causes.begin(), report.causes.end(), [](const CauseLine& c) { return c.id == "clock_delay"; });
