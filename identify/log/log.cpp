@@ -184,7 +184,7 @@ double first_degC(const Log& log) {
 Log without_last(Log log, double fraction) {
   const auto& t = log.of(Role::time);
   const auto end = std::lower_bound(t.begin(), t.end(), (1 - fraction) * t.back());
-  const auto rows = static_cast<std::size_t>(end - t.begin());
+  const auto rows = static_cast<std::size_t>(std::max(end - t.begin(), std::ptrdiff_t{1}));
   for (std::vector<double>& column : log.columns) column.resize(std::min(column.size(), rows));
   return log;
 }

@@ -76,7 +76,7 @@ Role sink_of(const Log& log);
 /// something does at once; NaN: none.
 double first_degC(const Log& log);
 
-/// The rows before the last `fraction` of the log's time.
+/// The rows before the last `fraction` of the log's time, one at least.
 Log without_last(Log log, double fraction);
 
 /// Each row with what the next one has, the last with its own.
