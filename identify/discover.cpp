@@ -276,7 +276,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
-    report.extended_rmse = rmse_of(problem, extended ? closest(problem, answer) : answer);
+    report.extended_rmse = rmse_of(problem, extended || near ? closest(problem, found.chosen.fit) : answer);
     tell(problem, found, logs, report);
   }
   const Offer offer = for_the_board(problem, found, answer, report);
