@@ -27,6 +27,7 @@ expect(run_both 0 "Axis 0: done in 0.3.*Axis 1: done in 0.3" ${sim} run "3A 0.3s
 expect(mode 0 "axis 0: current mode, setpoints in A.*axis 1: current mode" ${sim} mode)
 expect(run_in_the_wrong_mode 8 "^Axis 0 is in current mode and takes no N m.*'mode torque --axis 0' at the prompt" ${sim} run "20mNm 0.3s")
 expect(arm_beyond_any_board 8 "^Axis 0 refused the setpoint 1e.09 A: .*beyond any board" ${sim} arm --iq 1e9)
+expect(allowance_for_a_second 0 "\"time_left_s\":null,\"allowance_1s_A\":[1-9]" ${sim} --json watch --seconds 3 --rate 1)
 expect(stop 0 "Disarmed: both axes" ${sim} stop)
 expect(calibrate 0 "axis 1: the current sensors' offsets are" ${sim} calibrate)
 expect(fault 0 "axis 0: no fault" ${sim} fault)

@@ -89,6 +89,7 @@ void VirtualBoard::advance(int periods) {
       driver_->watch();
       usb_->bus.frame();
       usb_->link.work(flash_);
+      if (!usb_->link.looks_ahead()) driver_->look_ahead();  // one at a time, as on the H8-15D
     }
     if (periods_ % slow_periods == 0) driver_->slow_tick(plant_->slow(), {plant_->slow(0), plant_->slow(1)});
   }
