@@ -164,7 +164,7 @@ int answer(Arguments a) {
 
 int main(int argc, char** argv) {
   CLI::App app{examples};
-  wire::pc::use_help(app, "identify --help");
+  wire::pc::use_help(app, "identify");
   Arguments a;
   app.add_option("LOG", a.logs, "CSV logs of one motor, fitted together")->required();
   app.add_option(

@@ -27,6 +27,7 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "boards/dual_48v_20a.hpp"
 #include "tests/boards-host/fault_stand.hpp"
@@ -68,11 +69,14 @@ constexpr double after_trip_s = 0.3;              // an open bridge only cools
 constexpr long hang_us = 300'000;                 // of CPU without a period, which takes 10: it hangs
 
 constexpr const char* examples =
-    "Examples:\n"
+    "F19: what becomes of single flipped bits in the firmware's state, on simulated boards\n"
+    "\n"
+    "Examples\n"
     "  flips                        3000 flips on three motors, 10 s each: some minutes\n"
     "  flips --flips 400 --seconds 2 --motors 1 --check 0.99\n"
     "  flips --part rotor_ --list   only there, and each flip that did harm\n"
-    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
+    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is\n"
+    "wrong.\n";
 
 /// What is seen of both axes in a trial; crosses a pipe.
 struct Seen {
@@ -268,17 +272,27 @@ std::string line(const std::string& name, std::size_t bytes, const Tally& t) {
                      t.of(Became::harmful));
 }
 
+nlohmann::ordered_json json_of(std::size_t bytes, const Tally& t) {
+  return {{"bytes", bytes},
+          {"flips", t.all()},
+          {"no_effect", t.of(Became::no_effect)},
+          {"harmless", t.of(Became::harmless)},
+          {"detected", t.of(Became::detected)},
+          {"detected_within_10_ms", t.soon},
+          {"watchdog", t.of(Became::watchdog)},
+          {"harmful", t.of(Became::harmful)}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"F19: what becomes of single flipped bits in the firmware's state, on simulated boards"};
-  wire::pc::use_help(app, "flips --help");
-  app.footer(examples);
+  CLI::App app{examples};
+  wire::pc::use_help(app, "flips");
   int flips = 3000, motor_count = 3, at_once = 20;
   double seconds = 10, least = -1;
   std::uint64_t seed = 1000;
   std::vector<std::string> only;
-  bool list = false;
+  bool list = false, json = false;
   app.add_option("--flips", flips, "how many")->capture_default_str()->check(wire::pc::between(1, 1e6));
   app.add_option("--seconds", seconds, "simulated after each")
       ->capture_default_str()
@@ -289,7 +303,9 @@ int main(int argc, char** argv) {
   app.add_option("--seed", seed, "of everything drawn")->capture_default_str()->check(wire::pc::between(0, 1e15));
   app.add_option("--part", only, "only bytes of these members");
   app.add_flag("--list", list, "each flip that did harm, on standard error");
-  app.add_option("--check", least, "end with an error when a smaller share is detected or harmless");
+  app.add_option("--check", least, "end with an error when a smaller share is detected or harmless")
+      ->check(wire::pc::between(0, 1));
+  app.add_flag("--json", json, "the table as JSON");
   return wire::pc::run_program(app, argc, argv, [&] {
     Random random(seed);
     std::map<std::string, std::pair<std::size_t, Tally>> by_part;
@@ -336,11 +352,17 @@ int main(int argc, char** argv) {
                      verdict.told_s >= 0 ? fmt::format(", told after {:.3f} s", verdict.told_s) : "");
       }
     }
+    const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
+    if (json) {
+      nlohmann::ordered_json parts = json_of(size, sum);
+      for (const auto& [name, found] : by_part) parts["parts"][name] = json_of(found.first, found.second);
+      fmt::print("{}\n", parts.dump(2));
+      return share < least ? 1 : 0;
+    }
     fmt::print("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", "part", "bytes", "flips", "no effect", "harmless",
                "detected", "watchdog", "harmful");
     for (const auto& [name, found] : by_part) fmt::print("{}", line(name, found.first, found.second));
     fmt::print("{}", line("all", size, sum));
-    const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
     fmt::print("{:.2f} % detected or harmless; {} of {} detected within 10 ms\n", 100 * share, sum.soon,
                sum.of(Became::detected));
     return share < least ? 1 : 0;
