@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "console/commands.hpp"
+#include "wire/pc/help.hpp"
 #include "wire/pc/names.hpp"
 
 namespace console {
@@ -13,7 +14,7 @@ constexpr const char* examples =
     "Examples\n"
     "  hotcore list                                  boards that are plugged in\n"
     "  hotcore watch                                 live values and curves of both axes\n"
-    "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now, standing or turning?\n"
+    "  hotcore ask \"20A 0.3s, 6A 5s\"                 could the winding stand this now?\n"
     "  hotcore run \"5A 1s, 0A 0.5s\" --axis 1         arm, play a course of current, disarm\n"
     "  hotcore --sim run \"20A 20ms, -20A 40ms, 20A 20ms\" --times 40   shaken until heat limits it\n"
     "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
@@ -24,7 +25,7 @@ constexpr const char* examples =
     "  hotcore --sim watch                           the same on a simulated board, without any hardware\n";
 
 constexpr const char* exit_codes =
-    "Exit codes: 0 done; 2 command line or file wrong; 3 data unusable; 4 no board, or several fit; 5 no permission\n"
+    "Exit codes: 0 done; 2 command line or file wrong; 3 data unusable; 4 no board, or several fit; 5 no permission "
     "(see hotcore udev); 6 busy; 7 the board went away; 8 the board refused; 9 versions differ; 130 Ctrl-C, "
     "disarmed.\n";
 
@@ -32,6 +33,9 @@ void add_options(CLI::App& app, Console& console) {
   app.add_option("--serial", console.options.serial, "the board whose serial begins so");
   app.add_flag("--sim", console.options.sim,
                "a simulated board in this process (HOTCORE_SIM_FAST=1: faster than real time)");
+  app.add_option("--motor", console.options.motor, "the motors of that board: a .toml file, or a name in boards/motors")
+      ->capture_default_str()
+      ->type_name("MOTOR");
   app.add_flag("--json", console.options.json, "answer in JSON, one object a line");
 }
 
@@ -71,7 +75,8 @@ void add_commands(CLI::App& app, Console& console) {
 }
 
 int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {
-  CLI::App app{examples, "hotcore"};
+  CLI::App app{examples};
+  wire::pc::use_help(app, "hotcore");
   app.footer(exit_codes);
   add_options(app, console);
   add_commands(app, console);

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "console/link/sim.hpp"
 #include "console/link/usb.hpp"
 #include "console/session.hpp"
 
@@ -21,6 +22,7 @@ using wire::pc::UserError;
 
 struct Options {
   std::string serial;
+  std::string motor = link::SimulatedBoard{}.motor;
   bool sim = false, json = false;
 };
 

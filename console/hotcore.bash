@@ -5,7 +5,7 @@ _hotcore() {
   local word=${COMP_WORDS[COMP_CWORD]} command="" choice=() i
   for ((i = 1; i < COMP_CWORD; i++)); do
     case ${COMP_WORDS[i]} in
-      --serial) choice+=(--serial "${COMP_WORDS[++i]}") ;;
+      --serial | --motor) choice+=("${COMP_WORDS[i]}" "${COMP_WORDS[++i]}") ;;
       --sim) choice+=(--sim) ;;
       -*) ;;
       *) command=${COMP_WORDS[i]}; break ;;

@@ -183,8 +183,7 @@ Outcome put_in_force(Console& console, int axis, const Values& before, const Val
 void identify(Console& console, const Arguments& a) {
   const std::string log = a.out + "/log.csv", sheet = a.out + "/motor.toml", json = a.out + "/answer.json",
                     model = a.out + "/model.toml";
-  std::error_code told_below;
-  std::filesystem::create_directories(a.out, told_below);
+  wire::pc::need_folder(a.out);
   wire::pc::need_new_file(log, a.force);
   Session& session = console.session();
   const int axis = a.axis == "1" ? 1 : 0;
@@ -258,7 +257,7 @@ void add_consent(CLI::App& command, Consent& consent) {
 void add_model(CLI::App& app, Console& console) {
   auto a = std::make_shared<ModelArguments>();
   CLI::App* command = app.add_subcommand("model", "put a model of 'identify --write-model' in force");
-  command->add_option("file", a->file, "the model")->required();
+  command->add_option("FILE", a->file, "the model")->required();
   command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   add_consent(*command, a->consent);
   command->callback([&console, a] { take_model(console, *a); });

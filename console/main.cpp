@@ -9,6 +9,7 @@ namespace {
 
 std::unique_ptr<console::link::Transport> simulated(const console::Options& options) {
   console::link::SimulatedBoard board;
+  board.motor = options.motor;
   board.motor_folder = HOTCORE_MOTOR_FOLDER;
   if (!options.serial.empty()) board.serial = options.serial;
   board.real_time = std::getenv("HOTCORE_SIM_FAST") == nullptr;  // tests do not wait for the world

@@ -263,7 +263,7 @@ void add_motion(CLI::App& app, Console& console) {
         torque->count() > 0 ? Piece{a->torque_Nm, a->seconds, wire::ControlMode::torque} : Piece{a->iq_A, a->seconds});
   });
 
-  command = app.add_subcommand("mode", "what setpoints mean: current, or torque by the magnet's flux; or tell it");
+  command = app.add_subcommand("mode", "what setpoints mean, current or torque; or tell it");
   a = with_axis(command, "both", true);
   command->add_option("MODE", a->mode, "current or torque; every start begins with current")
       ->check(CLI::IsMember({"current", "torque"}));
@@ -296,7 +296,7 @@ void add_motion(CLI::App& app, Console& console) {
   command->add_flag("--clear", a->clear, "clear it; the axis stays off until armed");
   command->callback([&console, a] { fault(console, a->axis, a->clear); });
 
-  command = app.add_subcommand("ask", "could this course of current be driven now, and how hot would the winding get?");
+  command = app.add_subcommand("ask", "could this course be driven now, and how hot would the winding get?");
   a = with_axis(command, "0", false);
   command->add_option("COURSE", a->course, "such as \"20A 0.3s, 6A 5s\"")->required();
   command->add_flag("--turning", a->turns, "answer for a rotor that turns all the time; else for one that may stand");

@@ -49,6 +49,7 @@ ParameterFile read_parameter_file(const std::string& path, const Dictionary& dic
   if (!std::filesystem::is_regular_file(path))
     refuse(path + ": there is no such file; check the path, or write one with 'hotcore backup'.");
   const toml::table file = wire::pc::parse_toml(path);
+  wire::pc::need_kind("parameter file", path, file);
   const auto name = file["board"]["name"].value<std::string>(), serial = file["board"]["serial"].value<std::string>();
   ParameterFile read{name && serial ? *name + " " + *serial : "", {}};
   std::vector<Assignment>& assignments = read.assignments;

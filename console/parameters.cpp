@@ -53,7 +53,7 @@ void get(Console& console, const std::vector<std::string>& names, bool names_onl
 /// "name=value", for one axis or both.
 void parse(const std::string& text, const Dictionary& dictionary, std::vector<Assignment>& assignments) {
   const std::size_t equals = text.find('=');
-  if (equals == std::string::npos)
+  if (equals == std::string::npos || equals == 0)
     refuse(fmt::format("'{}' sets nothing; write name=value, such as current_limit_A=12.", text));
   const std::string name = text.substr(0, equals), value_text = text.substr(equals + 1);
   float value = 0;

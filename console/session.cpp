@@ -10,6 +10,7 @@
 namespace console {
 namespace {
 
+using link::bytes_of;
 using wire::Kind;
 using wire::pc::Exit;
 using wire::pc::refuse;
@@ -20,11 +21,6 @@ using wire::pc::UserError;
 constexpr double slow_s = 5.0;
 // 60 s ahead take a board 1.2 s, in the dearest model up to 7 s.
 constexpr double look_ahead_s = 15.0;
-
-template <class Message>
-std::span<const std::uint8_t> bytes_of(const Message& message) {
-  return {reinterpret_cast<const std::uint8_t*>(&message), sizeof message};
-}
 
 /// A head and what is packed behind it.
 class Payload {

@@ -36,15 +36,19 @@ inline constexpr int parameter_count = static_cast<int>(sizeof(AxisSet) / sizeof
 /// The first thing wrong with a set as a whole. An axis of which nothing was ever given is no mistake: it does not arm.
 [[nodiscard]] wire::Answer check(const ParameterSet& set, const BoardRating& rating);
 
+/// Of a save of so many. Payload: version, count, ids (two a word), values of axis 0, of axis 1.
+constexpr std::size_t parameter_record_words(std::size_t saved) {
+  return header_words + 2 + (saved + 1) / 2 + axis_count * saved;
+}
+
 class ParameterStore {
  public:
   static constexpr std::size_t slot_bytes = 1024;
-  // Of what identify may find a motor has little, and a long save would outlast the board's watchdog: five of them are
-  // saved, and those that stand at their default are not.
+  // Of what identify may find a motor has little, and a board stands still while it saves: five of them are saved, and
+  // those that stand at their default are not.
   static constexpr int always_saved = parameter_count - found_count, most_saved = always_saved + 5;
-  // Payload: version, count, ids (two a word), values of axis 0, of axis 1.
-  static constexpr std::size_t record_words = header_words + 2 + (most_saved + 1) / 2 + axis_count * most_saved;
-  static_assert(record_words == 104 && 4 * record_words <= slot_bytes);
+  static constexpr std::size_t record_words = parameter_record_words(most_saved);
+  static_assert(4 * record_words <= slot_bytes, "as many parameters as a slot holds");
 
   explicit ParameterStore(const BoardRating& rating) : rating_(rating) {
     in_force_.seal();
@@ -80,7 +84,7 @@ class ParameterStore {
   /// The staged set is checked as a whole and put in force. Refused: nothing has changed.
   wire::Answer commit(Driver& driver);
 
-  /// What is in force goes to flash: at most 10.4 ms of standstill (104 words of 100 us).
+  /// What is in force goes to flash, record_words of it: up to 100 us of standstill each.
   template <hal::Store S>
   wire::Answer save(const Driver& driver, S& store) {
     const wire::Answer against = against_saving(driver);

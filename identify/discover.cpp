@@ -167,7 +167,8 @@ std::optional<Report> read_a_row_sooner(double ahead_rows, const std::vector<Log
   std::vector<Log> sooner = given;
   HoldOut held_sooner = held;
   for (std::vector<Log>* some : {&sooner, &held_sooner.logs})
-    std::transform(some->begin(), some->end(), some->begin(), loaded_before);
+    std::transform(some->begin(), some->end(), some->begin(),
+                   [](const Log& log) { return loaded_before(log, "the temperatures ask it"); });
   Report report = discover(sooner, motor, held_sooner, doing);
   const bool remains =
       std::any_of(report.causes.begin(), report.causes.end(), [](const CauseLine& c) { return c.id == "clock_delay"; });
@@ -275,7 +276,7 @@ Report discover(const std::vector<Log>& given, const std::optional<wire::pc::Mot
     report.reasoning.insert(report.reasoning.end(), found.steps.begin(), found.steps.end());
     report.reasoning.push_back(poor);
   } else {
-    report.extended_rmse = rmse_of(problem, extended ? closest(problem, answer) : answer);
+    report.extended_rmse = rmse_of(problem, extended || near ? closest(problem, found.chosen.fit) : answer);
     tell(problem, found, logs, report);
   }
   const Offer offer = for_the_board(problem, found, answer, report);

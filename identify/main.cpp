@@ -39,7 +39,7 @@ struct Arguments {
   std::vector<std::string> logs, columns, truths;
   std::string motor, map, rows, hold_out, json, html, write_model, write_baseline;
   std::optional<double> period_s, ambient_degC;
-  bool explain = false;
+  bool explain = false, averaged = false;
   int draws = identify::HoldOut{}.draws;
 };
 
@@ -124,6 +124,7 @@ int answer(Arguments a) {
   map.folder = HOTCORE_MAP_FOLDER;
   if (a.period_s) map.period_s = *a.period_s;
   if (a.ambient_degC) map.ambient_degC = *a.ambient_degC;
+  map.averaged = map.averaged || a.averaged;
   if (!a.truths.empty()) {
     identify::score_logs(
         a.logs, a.truths, [&](const std::string& path) { return read(path, map, motor); }, motor);
@@ -163,7 +164,7 @@ int answer(Arguments a) {
 
 int main(int argc, char** argv) {
   CLI::App app{examples};
-  wire::pc::use_help(app, "identify --help");
+  wire::pc::use_help(app, "identify");
   Arguments a;
   app.add_option("LOG", a.logs, "CSV logs of one motor, fitted together")->required();
   app.add_option(
@@ -189,6 +190,9 @@ int main(int argc, char** argv) {
                  "how warm the room was, of logs without ambient_degC; else what a log begins at is taken for it")
       ->check(wire::pc::between(-60.0, 100.0))
       ->type_name("DEGC");
+  app.add_flag("--averaged", a.averaged,
+               "a row tells all that flowed since the row before it, a current's rms or a power's mean, and not what "
+               "flows at its moment; laws of speed are then hard to tell apart");
   app.add_flag("--explain", a.explain, "tell the chain of reasoning as well");
   app.add_option("--hold-out", a.hold_out,
                  "a log, or the last part of each log as a fraction (0.25 or 25%), that is scored and not fitted")

@@ -38,9 +38,6 @@ std::uint32_t stack_left() {
 
 }  // namespace
 
-static_assert(firmware::ParameterStore::record_words * 100 + 2'000 < (iwdg_reload + 1) * 4'000'000ull / lsi_fastest_Hz,
-              "a save at 100 us a word, and 2 ms of the loop around it, must end before the watchdog bites");
-
 namespace h8_15d {
 
 Application::Application()

@@ -14,13 +14,15 @@ class FlashStore {
   std::span<const std::uint8_t> area(int which) const {
     return {reinterpret_cast<const std::uint8_t*>(sector_address(sector(which))), sector_bytes};
   }
-  /// A word costs 16 to 100 us of standstill. `dying_`: the fast lane has ended, so its watchdog is fed word by word.
+  /// A word costs 16 to 100 us of standstill. Each is a sign of life of the main loop, however many a save takes.
+  /// `dying_`: the fast lane has ended, so its watchdog is fed word by word as well.
   bool program(int which, std::size_t byte, std::span<const std::uint32_t> words) {
     if (byte >= sector_bytes || words.size_bytes() > sector_bytes - byte) return false;
     bool good = true;
     for (const std::uint32_t word : words) {
       good = program_flash(sector_address(sector(which)) + static_cast<std::uint32_t>(byte), word) && good;
       byte += 4;
+      feed_iwdg();
       if (dying_) feed_wwdg();
     }
     return good;

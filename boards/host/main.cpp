@@ -85,13 +85,14 @@ void run(const std::string& name, const std::vector<std::string>& overrides, con
     options.plant_motor = motor.motor;
     options.hidden = motor.hidden;
   }
+  const std::string folder = out + "/" + scene.id;
+  wire::pc::need_folder(folder);
   Result result;
   {
     Progress progress(scene.id);
     options.progress = [&](double share) { progress(share); };
     result = run_scene(scene, options);
   }
-  const std::string folder = out + "/" + scene.id;
   write_files(result, folder);
   if (json)
     fmt::print("{}", summary_json(result));
@@ -107,6 +108,7 @@ void figures(const std::string& out, bool json) {
 }
 
 void record_log(RecordOptions options, const std::string& out, bool json) {
+  wire::pc::need_folder(out);
   Recording recording;
   {
     Progress progress("recording");
@@ -149,8 +151,8 @@ int main(int argc, char** argv) {
 #ifdef HOTCORE_TRAP_FLOATS
   feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
 #endif
-  CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples), "host-sim"};
-  wire::pc::use_help(app, "--help");
+  CLI::App app{fmt::format("{}\nSimulated boards with the firmware that would be flashed.\n", examples)};
+  wire::pc::use_help(app, "host-sim");
   app.require_subcommand(1);
   std::string scene, hide, out = "out";
   std::vector<std::string> overrides;

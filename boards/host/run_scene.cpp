@@ -173,6 +173,7 @@ firmware::DriverSetup Board::setup(const Scene& scene, Limiter limiter, const wi
   const firmware::BoardRating rating = rating_of(scene.board);
   firmware::AxisSetup axis;
   axis.parameters = firmware::parameters_from(known, rating, {static_cast<float>(scene.supply_V), 0.0f});
+  need_drivable(scene.motor, {axis.parameters, firmware::heat_parameters_from(known, thermal::sheet_trust)}, rating);
   thermal::Trust of_the_model = thermal::identified_trust;
   if (scene.model.empty()) {
     axis.heat = thermal::three_phase_set(known);

@@ -66,6 +66,19 @@ void read_table(const std::string& place, const toml::table& table, const Slots&
   }
 }
 
+/// What stands there as a table or a list, null if nothing does: of another kind it would be read as nothing.
+template <class Kind>
+const Kind* kept_as(const std::string& path, const toml::table& table, const char* key, const char* how) {
+  const toml::node* node = table.get(key);
+  if (node == nullptr) return nullptr;
+  if (const Kind* kind = node->as<Kind>()) return kind;
+  refuse(fmt::format("{}: '{}' must be written as {}.", path, key, how));
+}
+
+void need_whole(const std::string& place, const char* key, double value) {
+  if (value != std::floor(value)) refuse(fmt::format("{}: {} = {} must be a whole number.", place, key, value));
+}
+
 // Bounds are what the numerics were tried with, not what is wise: a day, the boiling point of solder, a large robot.
 constexpr double day_s = 86400, highest_degC = 300, most_A = 200;
 
@@ -107,8 +120,12 @@ struct Reader {
   void read_shaft(const std::string& place, const toml::table& table) {
     std::string kind = "locked";
     read_table(place, table, shaft(&kind));
-    if (const toml::array* list = table["landings_s"].as_array()) {
-      for (const toml::node& node : *list) scene.shaft.landings_s.push_back(node.value<double>().value_or(0));
+    if (const auto* list = kept_as<toml::array>(place, table, "landings_s", "a list, [0.6, 1.2]")) {
+      for (const toml::node& node : *list) {
+        const auto value = node.value<double>();
+        if (!value) refuse(place + ": landings_s must be numbers.");
+        scene.shaft.landings_s.push_back(*value);
+      }
     }
     if (kind == "locked")
       scene.shaft.kind = Shaft::Kind::locked;
@@ -135,7 +152,8 @@ struct Reader {
                    {"ripple_ratio", {&d.ripple_ratio, 0, 10}},
                    {"frequency_Hz", {&d.frequency_Hz, 0, 1000}}},
                   {}});
-      d.axis = axis >= 0.5 ? 1 : 0;
+      need_whole(place, "axis", axis);
+      d.axis = static_cast<int>(axis);
       if (!(d.to_s > d.from_s)) refuse(place + ": to_s must lie after from_s.");
       scene.demands.push_back(d);
     }
@@ -222,10 +240,14 @@ Scene read_scene(const std::string& which, const std::string& folder, const std:
   reader.scene.id = fs::path(path).stem().string();
   reader.scene.title = reader.scene.id;
   read_table(path, table, reader.top());
-  if (const toml::array* list = table["limiters"].as_array()) reader.read_limiters(path, *list);
-  if (const toml::array* list = table["demand"].as_array()) reader.read_demands(path, *list);
-  if (const toml::table* shaft = table["shaft"].as_table()) reader.read_shaft(path + ": shaft", *shaft);
+  if (const auto* list = kept_as<toml::array>(path, table, "limiters", "a list, [\"governor\"]"))
+    reader.read_limiters(path, *list);
+  if (const auto* list = kept_as<toml::array>(path, table, "demand", "[[demand]], once for each"))
+    reader.read_demands(path, *list);
+  if (const auto* shaft = kept_as<toml::table>(path, table, "shaft", "[shaft]"))
+    reader.read_shaft(path + ": shaft", *shaft);
   for (const std::string& text : overrides) reader.apply(text);
+  need_whole(path, "seed", reader.seed);
   expect_one_of("board", reader.scene.board, {"h8-15d", "h8-17.5d"});
   expect_one_of("trust", reader.scene.trust, {"exact", "identified", "sheet"});
   reader.scene.supply_sinks = reader.supply_sinks != 0;

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "boards/host/stage.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "wire/pc/user_error.hpp"
 
 namespace boards::host {
 
@@ -41,6 +45,17 @@ thermal::Trust trust_of(const Scene& scene, const thermal::Trust& of_the_model) 
 
 int axes_of(const Scene& scene) {
   return std::any_of(scene.demands.begin(), scene.demands.end(), [](const Demand& d) { return d.axis == 1; }) ? 2 : 1;
+}
+
+void need_drivable(const std::string& motor, const firmware::AxisSet& set, const firmware::BoardRating& rating) {
+  const wire::Answer found = firmware::check({{set, set}}, rating);
+  if (found.status == 0) return;
+  for (int i = 0; i < firmware::parameter_count; ++i) {
+    const wire::ParameterInfo& p = *firmware::parameter_info(i);
+    if (p.id != found.id) continue;
+    wire::pc::refuse(fmt::format("{}: a board does not take its {} = {:g} {} ({:g} to {:g}: {}).", motor, p.name,
+                                 firmware::parameter_value(set, i), wire::text_of(p.unit), p.min, p.max, p.doc));
+  }
 }
 
 Result result_of(const Scene& scene, const wire::pc::MotorFile& file) {

@@ -5,7 +5,7 @@
 
 #include "boards/host/scene.hpp"
 #include "boards/host/trace.hpp"
-#include "firmware/axis.hpp"
+#include "firmware/parameter_store.hpp"
 #include "host-sim/plant/bench.hpp"
 #include "thermal/core_estimator.hpp"
 #include "wire/pc/motor_file.hpp"
@@ -26,6 +26,9 @@ thermal::Trust trust_of(const Scene& scene, const thermal::Trust& of_the_model =
 
 /// How many axes are asked for anything.
 int axes_of(const Scene& scene);
+
+/// Refuses a motor whose parameters a board of this rating would not take.
+void need_drivable(const std::string& motor, const firmware::AxisSet& set, const firmware::BoardRating& rating);
 
 /// Nothing played yet.
 Result result_of(const Scene& scene, const wire::pc::MotorFile& file);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -65,9 +66,10 @@ double share_of_optimum(const Result& result, const Trace& trace) {
 }
 
 double smallest_allowance_A(const Trace& trace) {
-  double smallest = 1e9;
+  const bool idle = std::all_of(trace.rows.begin(), trace.rows.end(), [](const Row& row) { return row.demand_A == 0; });
+  double smallest = std::numeric_limits<double>::infinity();
   for (const Row& row : trace.rows) {
-    if (row.demand_A != 0) smallest = std::min(smallest, row.allowance_A);
+    if (row.demand_A != 0 || idle) smallest = std::min(smallest, row.allowance_A);
   }
   return smallest;
 }

@@ -141,8 +141,17 @@ void Commands::answer(const wire::Frame& request, bool parameters_free, Reply& r
     case Kind::arm:
       if (!parameters_free) return reply.refuse(Status::busy);
       [[fallthrough]];
-    default:
+    case Kind::disarm:
+    case Kind::clear:
+    case Kind::fault:
+    case Kind::calibrate:
       return for_axes(kind, head_of<wire::Axes>(request).mask, reply);
+    case Kind::commit:  // errands
+    case Kind::save:
+    case Kind::load:
+    case Kind::ask:
+    case Kind::telemetry:  // never asked for
+      return;
   }
 }
 

@@ -112,7 +112,7 @@ void Chip::load(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   const std::vector<char> file((std::istreambuf_iterator<char>(in)), {});
   if (file.size() < sizeof(Elf32_Ehdr) || std::memcmp(file.data(), ELFMAG, SELFMAG) != 0)
-    throw std::runtime_error(path + " is not an ELF image");
+    throw std::runtime_error(path + ": this is no ELF image; give the one that was linked.");
   Elf32_Ehdr header;
   std::memcpy(&header, file.data(), sizeof header);
   const auto fits = [&](std::size_t offset, std::size_t bytes) {

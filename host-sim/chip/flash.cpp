@@ -16,8 +16,6 @@ constexpr Register map[] = {
     {Flash::optcr, "FLASH_OPTCR", 0x0FFFAAED, 0x0FFFFFEF, 0},
 };
 
-constexpr double word_s = 16e-6;  // STM32F405 datasheet, table "Flash memory programming": typ. 16 us (max 100 us)
-
 }  // namespace
 
 Flash::Flash(Host& host, Links links)

@@ -34,6 +34,7 @@ class Flash : public Device {
   void load(std::uint32_t where, const void* data, std::uint32_t bytes);
   std::uint32_t word(std::uint32_t where) const;
   std::uint64_t words_programmed() const { return words_; }
+  double word_s = 16e-6;  // that a word takes: STM32F405 datasheet, "Flash memory programming", 100e-6 at most
 
   static int sector_of(std::uint32_t where);
   static std::uint32_t sector_start(int sector);

@@ -177,7 +177,11 @@ std::string sentence(const Found& found, const Report& r) {
         return fmt::format(
             "Something is wrong ({}): {} would explain it, and so would a slow disturbance without a name.", miss,
             listed(names_of(found.sets.front().fit.chosen), " and "));
-      return fmt::format("Something is wrong ({}), and none of the known causes explains it.", miss);
+      return fmt::format("Something is wrong ({}), and none of the known causes explains it{}.", miss,
+                         after_K < (core ? e.core_K : e.housing_K)
+                             ? fmt::format("; the nearest, {}, leaves {:.2f} K",
+                                           listed(names_of(found.chosen.fit.chosen), " and "), after_K)
+                             : "");
     case Verdict::insufficient:
       return "";  // no_verdict
   }

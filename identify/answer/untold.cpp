@@ -36,13 +36,14 @@ std::vector<double> told_next(std::vector<double> load) {
 /// A row sooner than that.
 std::vector<double> told_sooner(std::vector<double> load) { return a_row_sooner(told_next(std::move(load))); }
 
-/// As it was told last, but for where it steps: there drawn, last or a row sooner, or the `other` of the two. A load
-/// that goes smoothly does not. Of columns that tell one current together, alike.
-std::vector<double> told_either(std::vector<double> load, unsigned draw, bool other) {
+/// As it was told last, but for where it steps: there drawn, last or `sooner`, or the `other` of the two. A load that
+/// goes smoothly does not. Of columns that tell one current together, alike.
+std::vector<double> told_either(const std::vector<double>& load, const std::vector<double>& sooner, unsigned draw,
+                                bool other) {
   constexpr double steps = 2;  // times what it changes by in the rows before and after, and more
   std::mt19937 random(draw);
-  std::vector<double> out = told_last(load);
-  const std::vector<double> last = out, sooner = told_sooner(std::move(load));
+  const std::vector<double> last = told_last(load);
+  std::vector<double> out = last;
   const auto change = [&](std::size_t i) { return i + 1 < last.size() ? std::abs(last[i + 1] - last[i]) : 0; };
   for (std::size_t i = 0; i < out.size(); ++i) {
     const bool drawn = (random() % 2 == 0) != other;
@@ -119,12 +120,15 @@ Problem under(const Problem& problem, std::vector<Log> logs,
 /// How far it moves the housing, or the winding read alone, when the load changes between the rows that tell it. Steps
 /// that come each at a moment of their own move it as no cause does: by no more than the best set leaves, `left_K`.
 double left_open_K(const Problem& problem, const Fit& baseline, const std::vector<Log>& logs, double left_K) {
+  // Of averages only cells that were not read leave anything open.
+  const auto early = logs.front().averaged ? told_next : told_sooner;
   const Problem last = under(problem, logs, told_last), next = under(problem, logs, told_next),
-                sooner = under(problem, logs, told_sooner);
+                sooner = under(problem, logs, early);
   std::vector<Problem> drawn;  // pairs: one may end where it began by chance
   for (unsigned i = 0; i < 8; ++i) {
-    drawn.push_back(under(problem, logs,
-                          [&](std::vector<double> load) { return told_either(std::move(load), i / 2, i % 2 == 1); }));
+    drawn.push_back(under(problem, logs, [&](const std::vector<double>& load) {
+      return told_either(load, early(load), i / 2, i % 2 == 1);
+    }));
   }
   double moved2 = 0, drawn2 = 0, less2 = 0, less_rise = 0, rise2 = 0, bins = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
@@ -256,7 +260,7 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
   const Fit &baseline = found.baseline.fit, &chosen = found.chosen.fit;
   const double left_K = disturbance_of(problem, fit(problem, chosen.chosen, {&chosen})).noise.disturbance_K;
   double open_K = left_open_K(problem, baseline, logs, left_K);
-  const bool alternates = alternates_between_rows(logs);
+  const bool alternates = !logs.front().averaged && alternates_between_rows(logs);
   const Apart by_gait = alternates ? open_by_gait(problem, baseline, logs) : Apart{};
   open_K = std::max(open_K, judged_K(problem, by_gait));
   // Of a name all that it explains is asked for: what imitates what flowed between the rows leaves nothing.
@@ -286,8 +290,9 @@ std::string too_sparse(const Problem& problem, const Found& found, const std::ve
   return fmt::format(
       "What {}, {:.2f} K, may be of the load alone: it changes between rows {:g} s apart or "
       "in cells that were not measured, and when exactly moves the {} by as much; record the {} in every row and "
-      "more often.",
-      what, of_load_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()));
+      "more often{}.",
+      what, of_load_K, apart_s, problem.logs.front().has_housing ? "housing" : "winding", heat_word(logs.front()),
+      logs.front().averaged ? "" : ", or say --averaged if a row tells its rms (a power's mean) since the row before");
 }
 
 }  // namespace identify

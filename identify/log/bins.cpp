@@ -103,6 +103,7 @@ Inputs inputs_of(const Log& log, Bins& out) {
   }
   out.has_power = log.has(Role::power);
   out.torque_for_A = log.torque_for_A;
+  out.averaged = log.averaged;
   in.power_W = out.has_power ? bridged(log.of(Role::power), t) : std::vector<double>(t.size(), 0.0);
   out.has_speed = log.has(Role::speed);
   in.speed_rad_per_s = out.has_speed ? bridged(log.of(Role::speed), t) : std::vector<double>(t.size(), 0.0);

@@ -59,6 +59,7 @@ struct Bins {
   double width_s = 0, interval_s = 0;  // of a bin; from row to row of the log, usually
   std::vector<Bin> bins;
   bool torque_for_A = false;    // as in Log
+  bool averaged = false;        // as in Log
   bool sink_assumed = false;    // to be as warm as what the log begins at
   bool sink_unwatched = false;  // or as a person said once: how it moved is not known
   bool has_power = false, has_speed = false, has_frame = false, has_neighbour = false, has_core = false,

@@ -67,6 +67,12 @@ std::map<Role, Source> from_map(const Table& table, const ColumnMap& map) {
   return found;
 }
 
+/// "current_A" of "current_A [A]".
+std::string bare(const std::string& name) {
+  const std::string out = name.substr(0, name.find_first_of("[("));
+  return out.substr(0, out.find_last_not_of(' ') + 1);
+}
+
 /// Adds own names of columns that the map does not give to another role, in other units too (current_mA). Of housing_K,
 /// whose unit is a letter that may mean anything, and of two such names a sentence asks.
 void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Source>& found) {
@@ -87,9 +93,9 @@ void add_own_names(const Table& table, const ColumnMap& map, std::map<Role, Sour
     std::string taken;
     for (const std::string& header : table.names) {
       if (mapped(header) || !header.starts_with(name.substr(0, cut + 1))) continue;
-      const std::string unit = header.substr(cut + 1);
+      const std::string unit = bare(header.substr(cut + 1));
       if (const auto known = unit_named(unit); !known || known->quantity != quantity_of(name.substr(cut + 1))) continue;
-      if (unit.size() == 1)
+      if (unit.size() == 1 && name.substr(cut + 1) != unit)
         refuse_data(fmt::format("{}: column '{}' is in {}, but {} is expected; say --column {}={}:{} to convert it.",
                                 table.file, header, unit, name, name, header, unit));
       if (!taken.empty())
@@ -129,13 +135,13 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
   constexpr std::string_view words[] = {"time", "timestamp", "elapsedtime", "date", "datetime", "date/time", "zeit"};
   const auto is_time = [&](const std::string& name) {
     const bool taken = std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
-    std::string bare = name.substr(0, name.find_first_of("[("));
-    if (const std::size_t cut = bare.rfind('_');
-        cut != bare.npos && cut > 0 && quantity_of(bare.substr(cut + 1)) == "time")
-      bare.resize(cut);
-    std::erase_if(bare, [](char c) { return c == '_' || c == ' ' || c == '%'; });
+    std::string word = bare(name);
+    if (const std::size_t cut = word.rfind('_');
+        cut != word.npos && cut > 0 && quantity_of(word.substr(cut + 1)) == "time")
+      word.resize(cut);
+    std::erase_if(word, [](char c) { return c == '_' || c == ' ' || c == '%'; });
     const bool says_so =
-        bare == "t" || std::find(std::begin(words), std::end(words), in_small(bare)) != std::end(words);
+        word == "t" || std::find(std::begin(words), std::end(words), in_small(word)) != std::end(words);
     return says_so && !taken;  // T is a temperature
   };
   const auto first = std::find_if(table.names.begin(), table.names.end(), is_time);
@@ -228,9 +234,10 @@ ColumnMap read_map(const std::string& path) {
     refuse(fmt::format("{}, line {}: {}; repair the map.", path, error.source().begin.line, error.description()));
   }
   for (const auto& [key, unused] : file) {
-    if (key.str() != "columns" && key.str() != "note" && key.str() != "period_s") {
-      refuse(fmt::format("{}: unknown key '{}'{} (a map holds [columns], note and period_s).", path, key.str(),
-                         wire::pc::did_you_mean(key.str(), {"columns", "note", "period_s"})));
+    const std::vector<std::string> keys = {"columns", "note", "period_s", "averaged"};
+    if (std::find(keys.begin(), keys.end(), key.str()) == keys.end()) {
+      refuse(fmt::format("{}: unknown key '{}'{} (a map holds [columns], note, period_s and averaged).", path,
+                         key.str(), wire::pc::did_you_mean(key.str(), keys)));
     }
   }
   ColumnMap map;
@@ -239,6 +246,10 @@ ColumnMap read_map(const std::string& path) {
     map.period_s = file["period_s"].value_or(missing);
     if (!(map.period_s > 0) || std::isinf(map.period_s))
       refuse(path + ": period_s: write the seconds from row to row, such as 0.5.");
+  }
+  if (const auto averaged = file["averaged"]) {
+    if (!averaged.is_boolean()) refuse(path + ": averaged: write true or false.");
+    map.averaged = averaged.value_or(false);
   }
   const toml::table* columns = file["columns"].as_table();
   if (columns == nullptr) refuse(path + ": [columns] is missing; write lines such as housing_degC = \"T_body\".");

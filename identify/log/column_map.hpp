@@ -67,13 +67,14 @@ struct ColumnMap {
   std::map<Role, Source> columns;
   double period_s = missing;      // from row to row of logs without a clock
   double ambient_degC = missing;  // of logs without a sink
+  bool averaged = false;          // Log::averaged
   std::string rows;               // "motor=left": only these (rows.hpp)
   std::string note;               // what a person should know of these logs, printed in the report
   std::string folder;             // of maps that came along: a refusal names the one that fits
 };
 
 /// Reads a map file: [columns] with role = "column" or role = { column = "...", unit = "rpm" }, and, where wanted, a
-/// note and period_s.
+/// note, period_s and averaged.
 ColumnMap read_map(const std::string& path);
 
 /// Adds "role=column" or "role=column:unit" to a map; `from`: where it was said, for complaints.

@@ -184,7 +184,7 @@ double first_degC(const Log& log) {
 Log without_last(Log log, double fraction) {
   const auto& t = log.of(Role::time);
   const auto end = std::lower_bound(t.begin(), t.end(), (1 - fraction) * t.back());
-  const auto rows = static_cast<std::size_t>(end - t.begin());
+  const auto rows = static_cast<std::size_t>(std::max(end - t.begin(), std::ptrdiff_t{1}));
   for (std::vector<double>& column : log.columns) column.resize(std::min(column.size(), rows));
   return log;
 }
@@ -195,13 +195,12 @@ std::vector<double> a_row_sooner(std::vector<double> column) {
   return column;
 }
 
-Log loaded_before(Log log) {
+Log loaded_before(Log log, const char* why) {
   for (const Role role : load_roles) {
     if (log.has(role)) log.of(role) = a_row_sooner(std::move(log.of(role)));
   }
   log.loaded_before = true;
-  log.notes.push_back(
-      "Current and speed of a row are taken for those since the row before it: the temperatures ask it.");
+  log.notes.push_back(fmt::format("Current and speed of a row are taken for those since the row before it: {}.", why));
   return log;
 }
 
@@ -253,6 +252,8 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
     for (Log& log : parts_between_pauses(std::move(whole))) {
       mask(log);
       check_order(log);
+      if (map.averaged) log = loaded_before(std::move(log), "it was said that they are averaged");
+      log.averaged = map.averaged;
       logs.push_back(std::move(log));
     }
   }

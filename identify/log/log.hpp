@@ -48,6 +48,7 @@ struct Log {
   bool torque_for_A = false;      // a torque stands in iq_A as it is, for want of the motor's constant
   bool speed_guessed = false;     // in which unit it is, to be rad/s
   bool loaded_before = false;     // a row's load flowed since the row before, not until the next one
+  bool averaged = false;          // and is all of that, a current's rms or a power's mean: no draw of it
 
   const std::vector<double>& of(Role r) const { return columns[static_cast<std::size_t>(r)]; }
   std::vector<double>& of(Role r) { return columns[static_cast<std::size_t>(r)]; }
@@ -75,14 +76,14 @@ Role sink_of(const Log& log);
 /// something does at once; NaN: none.
 double first_degC(const Log& log);
 
-/// The rows before the last `fraction` of the log's time.
+/// The rows before the last `fraction` of the log's time, one at least.
 Log without_last(Log log, double fraction);
 
 /// Each row with what the next one has, the last with its own.
 std::vector<double> a_row_sooner(std::vector<double> column);
 
-/// The same, each row's load taken for what flowed since the row before it; a note says so.
-Log loaded_before(Log log);
+/// The same, each row's load taken for what flowed since the row before it; a note says so, and why.
+Log loaded_before(Log log, const char* why);
 
 /// The logs in a table: one, or one a session. Throws UserError (unusable; usage of a map that does not fit) in one
 /// sentence.

@@ -293,6 +293,11 @@ std::vector<double> behind_as_models_are_right(const Problem& judged, const Marg
   return out;
 }
 
+bool goes_by_speed(const Candidate& c) {
+  return std::any_of(c.fit.chosen.begin(), c.fit.chosen.end(),
+                     [](const Chosen& chosen) { return cause_of(chosen).needs == Needs::speed; });
+}
+
 /// Which sets are as good, and which nearly, so that a board must not take them for excluded? What is left over may
 /// belong to any of them. Told are the next best and those that differ from the best by no more than twice what is left
 /// (Margins::left_apart).
@@ -303,7 +308,9 @@ void mark_ties(const Problem& problem, const Problem& judged, const Left& left, 
   out.tied.push_back(ids_of(out.chosen.fit.chosen));
   for (std::size_t i = 0; i < out.sets.size(); ++i) {
     Candidate& c = out.sets[i];
-    const double behind = std::min(out.chosen.evidence - c.evidence, nearer[i]);
+    const bool blurred = problem.logs.front().averaged && goes_by_speed(out.chosen) && goes_by_speed(c);
+    const double behind = std::min(out.chosen.evidence - c.evidence, nearer[i]) -
+                          (blurred ? margins.of_averaged_speed * out.chosen.evidence : 0);
     if (c.chosen || (behind >= margins.tie + slack && by_noise_K == 0)) continue;
     const auto ids = ids_of(c.fit.chosen);
     if (std::find(out.tied.begin(), out.tied.end(), ids) != out.tied.end()) continue;

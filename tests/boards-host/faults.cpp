@@ -49,7 +49,9 @@ constexpr double shown_A = 2, shown_share = 0.1, shown_rad = pi / 6;
 constexpr double reduced_A = 0.6 * 6;  // R2: of the board's continuous current
 
 constexpr const char* examples =
-    "Examples:\n"
+    "The fault campaign: what the firmware does when one thing breaks, on simulated boards\n"
+    "\n"
+    "Examples\n"
     "  faults                       every fault, three motors, three scenes\n"
     "  faults --only F02 --seeds 20 --runs\n"
     "  faults --honest 10           hours without a fault: noise, gains apart, drift; nothing may trip\n"
@@ -476,9 +478,8 @@ int play_honestly(double hours, std::uint64_t first, bool terminal) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"The fault campaign: what the firmware does when one thing breaks, on simulated boards"};
-  wire::pc::use_help(app, "faults --help");
-  app.footer(examples);
+  CLI::App app{examples};
+  wire::pc::use_help(app, "faults");
   int seeds = 1;
   std::uint64_t first = tests::rotating_seed();
   double honest_hours = 0;

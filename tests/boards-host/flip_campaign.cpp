@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstring>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "boards/dual_48v_20a.hpp"
 #include "wire/pc/help.hpp"
@@ -148,6 +149,17 @@ void print(const std::string& name, const Tally& t) {
              t.of(Became::harmless), t.of(Became::detected), t.of(Became::watchdog), t.of(Became::harmful));
 }
 
+nlohmann::ordered_json json_of(const Tally& t) {
+  return {{"bytes", t.bytes},
+          {"flips", t.all()},
+          {"no_effect", t.of(Became::no_effect)},
+          {"harmless", t.of(Became::harmless)},
+          {"detected", t.of(Became::detected)},
+          {"detected_within_10_ms", t.soon},
+          {"watchdog", t.of(Became::watchdog)},
+          {"harmful", t.of(Became::harmful)}};
+}
+
 Scenery draw(host_sim::Random& random, int motor_count) {
   Scenery s;
   s.scene = std::array{push, stall, walk, stall}[random.next() % 4];
@@ -176,7 +188,9 @@ void Options::add_to(CLI::App& app) {
   app.add_option("--seed", seed, "of everything drawn")->capture_default_str()->check(wire::pc::between(0, 1e15));
   app.add_option("--part", only, "only bytes of these parts");
   app.add_flag("--list", list, "each flip that did harm, on standard error");
-  app.add_option("--check", least, "end with an error when a smaller share is detected or harmless");
+  app.add_option("--check", least, "end with an error when a smaller share is detected or harmless")
+      ->check(wire::pc::between(0, 1));
+  app.add_flag("--json", json, "the table as JSON");
 }
 
 int run_campaign(const Options& o,
@@ -216,11 +230,17 @@ int run_campaign(const Options& o,
       for (const Part& p : parts) tally.bytes += p.name == name ? p.bytes : 0;
     }
   }
+  const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
+  if (o.json) {
+    nlohmann::ordered_json all = json_of(sum);
+    for (const auto& [name, tally] : by_part) all["parts"][name] = json_of(tally);
+    fmt::print("{}\n", all.dump(2));
+    return share < o.least ? 1 : 0;
+  }
   fmt::print("{:<24} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>7}\n", "part", "bytes", "flips", "no effect", "harmless",
              "detected", "watchdog", "harmful");
   for (const auto& [name, tally] : by_part) print(name, tally);
   print("all", sum);
-  const double share = 1 - static_cast<double>(sum.of(Became::harmful)) / sum.all();
   fmt::print("{:.2f} % detected or harmless; {} of {} detected within 10 ms\n", 100 * share, sum.soon,
              sum.of(Became::detected));
   return share < o.least ? 1 : 0;

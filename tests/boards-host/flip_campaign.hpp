@@ -101,7 +101,7 @@ struct Options {
   double seconds, least = -1;
   std::uint64_t seed = 1000;
   std::vector<std::string> only{};
-  bool list = false;
+  bool list = false, json = false;
   void add_to(CLI::App& app);
 };
 

@@ -54,11 +54,14 @@ constexpr double after_trip_s = 0.3;  // an open bridge only cools
 constexpr long hang_us = 300'000;     // of CPU without a period, which takes 10: it hangs
 
 constexpr const char* examples =
-    "Examples:\n"
+    "F19: what becomes of single flipped bits in the firmware's state, on simulated boards\n"
+    "\n"
+    "Examples\n"
     "  flips                        3000 flips on three motors, 10 s each: some minutes\n"
     "  flips --flips 400 --seconds 2 --motors 1 --check 0.99\n"
     "  flips --part rotor_ --list   only there, and each flip that did harm\n"
-    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
+    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is\n"
+    "wrong.\n";
 
 volatile std::sig_atomic_t periods_since_look = 1;
 constexpr int hung = 3;
@@ -152,9 +155,8 @@ class Board : public Victim {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"F19: what becomes of single flipped bits in the firmware's state, on simulated boards"};
-  wire::pc::use_help(app, "flips --help");
-  app.footer(examples);
+  CLI::App app{examples};
+  wire::pc::use_help(app, "flips");
   Options options{.flips = 3000, .at_once = 20, .seconds = 10};
   options.add_to(app);
   return wire::pc::run_program(app, argc, argv, [&] {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "boards/dual_48v_20a.hpp"
 #include "boards/host/optimum.hpp"
 #include "boards/host/stage.hpp"
 #include "wire/pc/motor_file.hpp"
@@ -72,6 +73,40 @@ TEST(Scene, MistakesAreAnsweredWithTheNearestName) {
   EXPECT_NE(complaint_about("limiters = ['govenor']").find("not one of governor"), std::string::npos);
   EXPECT_NE(complaint_about("[[demand]]\nfrom_s = 2\nto_s = 1").find("to_s must lie after from_s"), std::string::npos);
   EXPECT_NE(complaint_about("seconds = ").find("line 1"), std::string::npos);
+}
+
+TEST(Scene, NothingIsLeftOutBecauseOfHowItIsWritten) {
+  EXPECT_NE(complaint_about("[demand]\nfrom_s = 1\nto_s = 2").find("'demand' must be written as [[demand]]"),
+            std::string::npos);
+  EXPECT_NE(complaint_about("[[shaft]]\nkind = 'free'").find("'shaft' must be written as [shaft]"), std::string::npos);
+  EXPECT_NE(complaint_about("limiters = 'governor'").find("must be written as a list"), std::string::npos);
+  EXPECT_NE(complaint_about("[shaft]\nkind = 'free'\nlandings_s = 0.6").find("a list"), std::string::npos);
+  EXPECT_NE(complaint_about("[shaft]\nkind = 'free'\nlandings_s = ['a']").find("must be numbers"), std::string::npos);
+  EXPECT_NE(complaint_about("seed = 1.5").find("seed = 1.5 must be a whole number"), std::string::npos);
+  EXPECT_NE(complaint_about("[[demand]]\naxis = 0.5\nfrom_s = 1\nto_s = 2").find("axis = 0.5 must be a whole"),
+            std::string::npos);
+}
+
+TEST(Scene, AMotorThatNoBoardTakesIsRefusedByItsParameter) {
+  wire::Motor motor = wire::pc::read_motor("ec-16-40w", HOTCORE_SOURCE_DIR "/boards/motors").motor;
+  const auto said = [&] {
+    const firmware::AxisSet set{firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
+                                firmware::heat_parameters_from(motor, thermal::sheet_trust)};
+    try {
+      boards::host::need_drivable("my.toml", set, boards::dual_48V_20A);
+    } catch (const wire::pc::UserError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(said(), "");
+  motor.phase_resistance_ohm = 100;
+  EXPECT_EQ(said().find("my.toml: a board does not take its phase_resistance = 100 ohm (0.001 to 50: "), 0u) << said();
+  motor.phase_resistance_ohm = 0.5;
+  motor.C1_J_per_K = 0.1;
+  EXPECT_NE(said().find("C1 = 0.1 J/K (0.01 to 100000: heat capacity of the whole winding; R1 C1 is at least 0.5 s)"),
+            std::string::npos)
+      << said();
 }
 
 TEST(Optimum, ReachesTheLimitThenHoldsItsCurrent) {

@@ -54,11 +54,14 @@ constexpr double too_cold_K = 3;                // after a reset: as F19
 constexpr unsigned cycles_per_instruction = 2;  // wait states and bus are not modelled; 1 is the least
 
 constexpr const char* examples =
-    "Examples:\n"
+    "F19: what becomes of single flipped bits in the memory of the flash image, on the chip model\n"
+    "\n"
+    "Examples\n"
     "  image_flips                    3000 flips on three motors: a quarter of an hour\n"
     "  image_flips --part stage_ link_ --flips 500 --list      only there, and each flip that did harm\n"
     "  image_flips --part core_.degC_ --inside CoreEstimator   in the middle of the slow lane\n"
-    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is wrong.\n";
+    "Exit codes: 0 done, 1 fewer than --check asks for are detected or harmless, 2 the command line is\n"
+    "wrong.\n";
 
 /// The image on its board, and a robot's computer on its USB cable.
 class Robot {
@@ -412,9 +415,8 @@ class Image : public Victim {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"F19: what becomes of single flipped bits in the memory of the flash image, on the chip model"};
-  wire::pc::use_help(app, "image_flips --help");
-  app.footer(examples);
+  CLI::App app{examples};
+  wire::pc::use_help(app, "image_flips");
   Options options{.flips = 3000, .at_once = 40, .seconds = 0.12};
   options.add_to(app);
   std::string inside, image = HOTCORE_SOURCE_DIR "/build/h8-15d/bin/h8-15d.elf";

@@ -41,6 +41,9 @@ check "the prompt without a board: exit code 4, one line" "$? $(wc -l <<<"$said"
 # paragraph COMMAND: what the manual says of it.
 paragraph() { sed 's/\\-/-/g; s/\\f.//g' "$manual" | awk -v c="$1" '/^\.TP/ { on = 0; getline; on = $2 == c } on'; }
 untold=""
+for o in $("$hotcore" --help | sed -n 's/^  \(--[a-z]*\).*/\1/p'); do
+  sed 's/\\-/-/g' "$manual" | grep -q "^\.BI\? $o\b" || untold+=" $o"
+done
 for c in $("$hotcore" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
   [ -n "$(paragraph "$c")" ] || untold+=" $c"
   for o in $("$hotcore" "$c" --help | sed -n 's/^  \(-h,\)\{0,1\}\(--[a-z]*\).*/\2/p' | grep -v '^--help$'); do

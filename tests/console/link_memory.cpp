@@ -48,11 +48,10 @@ int count() {
   console::link::Usb usb;
   console::link::Board board(usb.open(""));
   const wire::Setpoints wish{3, {}, 0, {0, 0}, {0, 0}};
-  const std::span payload(reinterpret_cast<const std::uint8_t*>(&wish), sizeof wish);
   const auto exchange = [&](int times) {
     int states = 0;
     for (int i = 0; i < times && !board.gone(); ++i) {
-      board.write(static_cast<std::uint8_t>(wire::Kind::setpoint), payload);
+      board.write(wire::Kind::setpoint, console::link::bytes_of(wish));
       for (bool answered = false; !answered && !board.gone();) {
         board.wait(10);
         while (const wire::Frame* frame = board.read()) answered = answered || console::link::state_in(*frame);
@@ -73,7 +72,12 @@ int count() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Memory that the link takes after its start: umockdev-wrapper mocked_bus link_memory"};
-  wire::pc::use_help(app, "link_memory --help");
+  CLI::App app{
+      "Memory that the link takes after its start, on the only board on the bus\n"
+      "\n"
+      "Examples\n"
+      "  umockdev-wrapper mocked_bus link_memory\n"
+      "Exit codes: 0 none, 1 some of ours, 2 the command line is wrong, 4 no board.\n"};
+  wire::pc::use_help(app, "link_memory");
   return wire::pc::run_program(app, argc, argv, count);
 }

@@ -11,16 +11,18 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <vector>
 
 #include "console/link/board.hpp"
 #include "console/link/messages.hpp"
 #include "console/link/sim.hpp"
+#include "wire/pc/help.hpp"
+#include "wire/pc/program.hpp"
 
 namespace {
 
 using console::link::Board;
+using console::link::bytes_of;
 
 double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -33,15 +35,10 @@ std::unique_ptr<Board> simulated(int number) {
   return std::make_unique<Board>(console::link::simulated_board(options));
 }
 
-template <class Message>
-std::span<const std::uint8_t> bytes_of(const Message& message) {
-  return {reinterpret_cast<const std::uint8_t*>(&message), sizeof message};
-}
-
 /// One exchange; the board's time that it took, or a negative number if no state came within 100 ms.
 double exchange(Board& board, const wire::Setpoints& setpoints) {
   const double sent_s = board.now_s();
-  if (!board.write(static_cast<std::uint8_t>(wire::Kind::setpoint), bytes_of(setpoints))) return -1;
+  if (!board.write(wire::Kind::setpoint, bytes_of(setpoints))) return -1;
   while (board.now_s() < sent_s + 0.1) {
     board.wait(1);
     while (const wire::Frame* frame = board.read()) {
@@ -51,22 +48,12 @@ double exchange(Board& board, const wire::Setpoints& setpoints) {
   return -1;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const bool json = argc > 1 && std::string_view(argv[argc - 1]) == "--json";
-  argc -= json ? 1 : 0;
-  const int count = argc > 1 ? std::atoi(argv[1]) : 64;
-  const double seconds = argc > 2 ? std::atof(argv[2]) : 5.0;
-  if (count < 1 || count > 1000 || !(seconds > 0 && seconds <= 3600)) {
-    fmt::print(stderr, "many_boards [BOARDS] [SECONDS] [--json]: 1 to 1000 boards, at most 3600 seconds.\n");
-    return 2;
-  }
+int measure(int count, double seconds, bool json) {
   std::vector<std::unique_ptr<Board>> boards;
   for (int i = 0; i < count; ++i) boards.push_back(simulated(i));
   const wire::Axes both{3};
   for (const auto& board : boards) {
-    board->write(static_cast<std::uint8_t>(wire::Kind::arm), bytes_of(both));
+    board->write(wire::Kind::arm, bytes_of(both));
     board->wait(5);
   }
 
@@ -109,4 +96,24 @@ int main(int argc, char** argv) {
                std::string(static_cast<std::size_t>(1 + 60 * n / total), '#'));
   fmt::print("One board as fast as it goes: {} exchanges a second\n", exchanges);
   return lost == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "How many boards one thread serves, each with the firmware, its USB stack and simple motors\n"
+      "\n"
+      "Examples\n"
+      "  many_boards                  64 boards for 5 s of their time\n"
+      "  many_boards 8 60 --json\n"
+      "Exit codes: 0 done, 1 an exchange was lost, 2 the command line is wrong.\n"};
+  wire::pc::use_help(app, "many_boards");
+  int count = 64;
+  double seconds = 5;
+  bool json = false;
+  app.add_option("boards", count, "1 to 1000; 64 unless said")->check(wire::pc::between(1, 1000));
+  app.add_option("seconds", seconds, "0.01 to 3600; 5 unless said")->check(wire::pc::between(0.01, 3600));
+  app.add_flag("--json", json, "the figures as JSON");
+  return wire::pc::run_program(app, argc, argv, [&] { return measure(count, seconds, json); });
 }

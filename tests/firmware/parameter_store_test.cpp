@@ -521,7 +521,7 @@ TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {
   b.put_in_force();
   ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
   const auto saved = [&](auto&& change) {
-    std::vector<std::uint32_t> words(91);
+    std::vector<std::uint32_t> words(firmware::parameter_record_words(ParameterStore::always_saved));
     std::memcpy(words.data(), b.flash.cells[0].data(), 4 * words.size());
     change(words);
     firmware::seal(words, words[0], 7);
@@ -531,7 +531,7 @@ TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {
     const wire::Answer answer = store.start(other);
     return std::pair(answer, store.in_force());
   };
-  constexpr std::uint32_t all = ParameterStore::always_saved, values_at = 6 + all / 2;
+  constexpr std::uint32_t all = ParameterStore::always_saved, values_at = 6 + (all + 1) / 2;
   // One that knew only some of the parameters: ids and values of the electrical list.
   const auto [older, migrated] = saved([](std::vector<std::uint32_t>& w) {
     constexpr std::uint32_t n = 16;
@@ -549,7 +549,7 @@ TEST(ParameterStore, AnOlderRecordIsMigratedAndANewerOneRefused) {
   const auto [newer_version, none] = saved([](std::vector<std::uint32_t>& w) { w[4] = 2; });
   EXPECT_EQ(newer_version.status, code(Status::newer_record));
   EXPECT_TRUE(wire::is_unset(none.axes[0].drive.phase_resistance_ohm)) << "nothing of it is used";
-  const auto [newer_id, nothing] = saved([](std::vector<std::uint32_t>& w) { w[values_at - 1] = 0x0999'0210; });
+  const auto [newer_id, nothing] = saved([](std::vector<std::uint32_t>& w) { w[6] = 0x0999'0101; });
   EXPECT_EQ(newer_id.status, code(Status::newer_record));
   EXPECT_EQ(newer_id.id, 0x0999);
   EXPECT_TRUE(wire::is_unset(nothing.axes[0].drive.phase_resistance_ohm));

@@ -56,8 +56,14 @@ int measure(bool json) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"What the simulated plant costs, in CPU time"};
-  wire::pc::use_help(app, "plant_speed --help");
+  CLI::App app{
+      "What the simulated plant costs, in CPU time\n"
+      "\n"
+      "Examples\n"
+      "  plant_speed                  each motor and how it is driven\n"
+      "  plant_speed --json\n"
+      "Exit codes: 0 done, 2 the command line is wrong.\n"};
+  wire::pc::use_help(app, "plant_speed");
   bool json = false;
   app.add_flag("--json", json, "one object a line");
   return wire::pc::run_program(app, argc, argv, [&] { return measure(json); });

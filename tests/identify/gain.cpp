@@ -150,8 +150,15 @@ int gain(const RecordOptions& options, const Asked& asked) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"What identify's model gains on the motor that was recorded, in host-sim"};
-  wire::pc::use_help(app, "gain --help");
+  CLI::App app{
+      "What identify's model gains on the motor that was recorded, in host-sim\n"
+      "\n"
+      "Examples\n"
+      "  gain --seeds 10                              ten motors on a robot's duty, half a minute each\n"
+      "  gain --excitation designed --first 501 --seeds 8\n"
+      "  gain --clean --seeds 2 --check\n"
+      "Exit codes: 0 done, 1 --check found a motor that is served worse, 2 the command line is wrong.\n"};
+  wire::pc::use_help(app, "gain");
   Asked asked;
   RecordOptions options{.motor_folder = root + "/boards/motors", .scene_folder = root + "/host-sim/scenes"};
   app.add_option("--seeds", asked.seeds, "motors")->capture_default_str()->check(wire::pc::between(1, 1e6));

@@ -64,14 +64,29 @@ TEST(Map, EachThatComesAlongIsReadAndTheOneOfSessionsTellsThePeriod) {
   }
   EXPECT_GE(read, 3);
   EXPECT_EQ(identify::read_map(HOTCORE_SOURCE_DIR "/identify/maps/paderborn_sessions.toml").period_s, 0.5);
-  const std::string path = (std::filesystem::temp_directory_path() / "period.toml").string();
-  std::ofstream(path) << "period_s = -1\n[columns]\nhousing_degC = \"T\"\n";
-  try {
-    identify::read_map(path);
-    ADD_FAILURE() << "a period of -1 s was read";
-  } catch (const UserError& error) {
-    says(error.what(), "seconds from row to row");
+  const std::string path = (std::filesystem::temp_directory_path() / "spoilt.toml").string();
+  for (const auto& [line, why] :
+       {std::pair("period_s = -1", "seconds from row to row"), std::pair("averaged = 1", "write true or false")}) {
+    std::ofstream(path) << line << "\n[columns]\nhousing_degC = \"T\"\n";
+    try {
+      identify::read_map(path);
+      ADD_FAILURE() << line << " was read";
+    } catch (const UserError& error) {
+      says(error.what(), why);
+    }
   }
+  std::ofstream(path) << "averaged = true\n[columns]\nhousing_degC = \"T\"\n";
+  EXPECT_TRUE(identify::read_map(path).averaged);
+}
+
+TEST(Map, ThatSaysSoReadsARowsLoadAsAllThatFlowedBeforeIt) {
+  ColumnMap map;
+  map.averaged = true;
+  const Log log = read("time_s,current_A,housing_degC\n0,1,20\n1,2,21\n2,3,22\n", map)[0];
+  EXPECT_TRUE(log.averaged);
+  EXPECT_EQ(log.of(Role::current), (std::vector<double>{2, 3, 3}));
+  EXPECT_EQ(log.of(Role::housing), (std::vector<double>{20, 21, 22}));
+  says(log.notes.back(), "since the row before it: it was said that they are averaged");
 }
 
 TEST(Map, OfVescToolReadsItsLog) {
@@ -216,6 +231,11 @@ TEST(Reader, AnOwnNameInAnotherUnitIsKnownByItsName) {
   EXPECT_NEAR(small.of(Role::housing)[1], 100, 1e-9);
   EXPECT_EQ(small.of(Role::speed)[0], 60);
   EXPECT_DOUBLE_EQ(read("time_s,current_A,current_mA,housing_degC\n0,1,7,20\n1,2,7,21\n")[0].of(Role::current)[1], 2);
+  const Log twice = read("time_s [s],current_A [A],housing_degC (°C),speed_rpm [rpm]\n0,1,20,60\n2,2,21,60\n")[0];
+  EXPECT_EQ(twice.of(Role::time)[1], 2);
+  EXPECT_EQ(twice.of(Role::current)[1], 2);
+  EXPECT_EQ(twice.of(Role::housing)[1], 21);
+  EXPECT_NEAR(twice.of(Role::speed)[0], 2 * M_PI, 1e-9);
   says(complaint("time_s,current_mA,current_kA,housing_degC\n0,1,7,20\n"),
        "columns 'current_mA' and 'current_kA' may both be current_A");
 }

@@ -572,6 +572,32 @@ std::vector<identify::Log> one_row_in(std::size_t every, const tests::BenchOptio
   return logs;
 }
 
+TEST(SlowReport, AveragesTellWhatDrawsOfAGaitCannot) {
+  tests::BenchOptions options;
+  options.seconds = 1800;
+  options.core_every_s = 30;
+  options.current_A = [](double t, std::mt19937_64&) {  // steps of 1.3 Hz, in spells of a minute
+    return std::fmod(t, 1 / 1.3) < 0.3 && std::fmod(t, 120) < 60 ? 4.0 : 0.0;
+  };
+  options.extra_housing_W = [](double, double, double) { return 0.4; };
+  identify::Log log = one_row_in(10, options).front();
+  const auto raw = tests::bench_logs({options}).front().of(identify::Role::current);
+  auto& rms_A = log.of(identify::Role::current);
+  for (std::size_t i = 1; i < rms_A.size(); ++i) {  // of what flowed in the second before the row
+    double sum2 = 0;
+    for (std::size_t k = 10 * (i - 1); k < 10 * i; ++k) sum2 += raw[k] * raw[k] / 10;
+    rms_A[i] = std::sqrt(sum2);
+  }
+  const identify::Report as_draws = identify::discover({log}, tests::ec_16());
+  EXPECT_EQ(as_draws.verdict, Verdict::insufficient);
+  says(as_draws.sentence, "or say --averaged if a row tells its rms");
+  log = identify::loaded_before(std::move(log), "it was said");
+  log.averaged = true;
+  const identify::Report report = identify::discover({log}, tests::ec_16());
+  ASSERT_FALSE(report.causes.empty()) << report.sentence;
+  says(report.sentence, "constant_heat");
+}
+
 TEST(SlowReport, RowsThatAreDrawsOfAGaitHideNoLargeCause) {
   for (const std::uint64_t seed : {1, 2}) {
     tests::BenchOptions options;

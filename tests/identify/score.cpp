@@ -370,8 +370,16 @@ int score(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Scores identify on logs with hidden effects"};
-  wire::pc::use_help(app, "score --help");
+  CLI::App app{
+      "Scores identify on logs with hidden effects\n"
+      "\n"
+      "Examples\n"
+      "  score --list                                   the rows, and what each hides in what\n"
+      "  score --seeds 2                                all of them, each figure beside what was promised\n"
+      "  score duty-sparse --seeds 2 --first 770 --quick\n"
+      "  score duty-sparse --only hot_spot --verbose --explain\n"
+      "Exit codes: 0 done, 1 --check found less than is held, 2 the command line is wrong.\n"};
+  wire::pc::use_help(app, "score");
   Arguments a;
   bool list = false;
   app.add_option("row", a.keys, "rows of the table; none: all")->check([](const std::string& key) {
@@ -390,21 +398,49 @@ int main(int argc, char** argv) {
   app.add_option("--first", a.first, "first seed")
       ->capture_default_str()
       ->check(wire::pc::between(0, wire::pc::most_seed));
-  app.add_option("--only", a.only, "one cause");
-  app.add_option("--remove", a.remove, "take a cause out of the table");
+  const auto named = [](std::vector<std::string> all) {
+    return [all](const std::string& id) {
+      if (std::find(all.begin(), all.end(), id) != all.end()) return std::string();
+      const std::string hint = wire::pc::did_you_mean(id, all);
+      return "there is no '" + id + "'" + (hint.empty() ? "" : hint);
+    };
+  };
+  std::vector<std::string> hidden = tests::hideable(), known;
+  for (const std::string& id : tests::outside()) hidden.push_back(id);
+  for (const identify::Cause& cause : identify::causes()) known.push_back(cause.id);
+  app.add_option("--only", a.only, "logs that hide this effect")->check(named(hidden));
+  app.add_option("--remove", a.remove, "take a cause out of the table")->check(named(known));
   app.add_option("--structure", a.structure, "how far the clean motor is from two nodes, 1 = host-sim's default")
-      ->check(CLI::Range(0.01, 1.0))  // of no size at all, teeth and yoke have no time constant
+      ->check(wire::pc::between(0.01, 1))  // of no size at all, teeth and yoke have no time constant
       ->capture_default_str();
-  app.add_option("--step", a.step_K, "K, of what the sensors tell: 1 = whole degrees")->capture_default_str();
-  app.add_option("--current-noise", a.current_noise, "white, of the current's rms")->capture_default_str();
-  app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")->capture_default_str();
+  app.add_option("--step", a.step_K, "K, of what the sensors tell: 1 = whole degrees")
+      ->capture_default_str()
+      ->check(wire::pc::between(0.001, 10));
+  app.add_option("--current-noise", a.current_noise, "white, of the current's rms")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 10));
+  app.add_option("--strength", a.strength, "of the effects, 1 = 1..10 K")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 100));
   app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
-  app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")->capture_default_str();
-  app.add_option("--second", a.margins.second, "for a second one")->capture_default_str();
-  app.add_option("--tie", a.margins.tie, "lead asked for a name of two causes")->capture_default_str();
-  app.add_option("--tie-alone", a.margins.tie_alone, "lead asked for a name of one")->capture_default_str();
-  app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")->capture_default_str();
-  app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")->capture_default_str();
+  app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--second", a.margins.second, "for a second one")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--tie", a.margins.tie, "lead asked for a name of two causes")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--tie-alone", a.margins.tie_alone, "lead asked for a name of one")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
+  app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")
+      ->capture_default_str()
+      ->check(wire::pc::between(0, 1e6));
   auto* quick = app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
   app.add_flag("--blind", a.blind, "identify is given no motor sheet")->needs(quick);
   app.add_flag("--check", a.check, "end with an error where what is held is missed");

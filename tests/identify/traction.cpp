@@ -75,8 +75,14 @@ int foretell(int seeds, int drives, std::uint64_t first, bool json) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"What identify foretells of traction motors of five masses"};
-  wire::pc::use_help(app, "traction --help");
+  CLI::App app{
+      "What identify foretells of traction motors of five masses\n"
+      "\n"
+      "Examples\n"
+      "  traction --seeds 40 --first 121              one drive each\n"
+      "  traction --seeds 20 --drives 5 --first 121   five each\n"
+      "Exit codes: 0 done, 2 the command line is wrong.\n"};
+  wire::pc::use_help(app, "traction");
   int seeds = 20, drives = 1;
   std::uint64_t first = tests::rotating_seed();
   bool json = false;

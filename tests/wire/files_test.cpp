@@ -34,6 +34,15 @@ TEST(Files, APipeIsWrittenToAndStaysAPipe) {
   close(both_ends);
 }
 
+TEST(Files, AFolderForResultsIsMadeOrRefusedBeforeTheWork) {
+  const std::string path = scratch("made/of/three");
+  wire::pc::need_folder(path);
+  EXPECT_TRUE(std::filesystem::is_directory(path));
+  write_whole(path + "/file", "text");
+  EXPECT_THROW(wire::pc::need_folder(path + "/file"), wire::pc::UserError);
+  EXPECT_THROW(wire::pc::need_folder("/proc/nowhere"), wire::pc::UserError);
+}
+
 TEST(Files, AFolderCannotBeWritten) {
   EXPECT_THROW(write_whole(std::filesystem::temp_directory_path().string(), "text"), wire::pc::UserError);
 }

@@ -69,11 +69,21 @@ TEST(MotorFile, AMisspeltKeyIsAnsweredWithTheNearest) {
 TEST(MotorFile, NumbersThatCannotBeAreRefused) {
   EXPECT_NE(complaint(file_with("tau_winding_s", "tau_winding_s = -1.22")).find("tau_winding_s = -1.22 cannot be"),
             std::string::npos);
-  EXPECT_NE(complaint(file_with("R1_K", "R1_K_per_W = nan")).find("finite number above zero"), std::string::npos);
+  EXPECT_NE(complaint(file_with("R1_K", "R1_K_per_W = nan")).find("of a motor it is 0.0001 to 10000"),
+            std::string::npos);
+  EXPECT_NE(complaint(file_with("winding_max", "winding_max_degC = 1e9")).find("it is 50 to 300"), std::string::npos);
+  EXPECT_NE(complaint(file_with("R1_K", "R1_K_per_W = 1e-9")).find("cannot be"), std::string::npos);
   EXPECT_NE(complaint(file_with("pole_pairs", "pole_pairs = 1.5")).find("whole number"), std::string::npos);
   EXPECT_NE(complaint(file_with("R2_K", "R2_K_per_W = \"warm\"")).find("must be a number"), std::string::npos);
   EXPECT_NE(complaint(file_with("R2_K", "")).find("'R2_K_per_W' is missing"), std::string::npos);
   EXPECT_NE(complaint(file_with("R2_K", "R2_K_per_W = = 3")).find("line "), std::string::npos);
+}
+
+TEST(MotorFile, ASurrogateIsNotTakenForASheetWhereTheWordIsMisspelt) {
+  EXPECT_NE(
+      complaint(file_with("status", "status = \"surogate\"")).find("status = 'surogate' is none; say 'surrogate'"),
+      std::string::npos);
+  EXPECT_NE(complaint(file_with("name", "name = 16")).find("'name' must be a text in quotes"), std::string::npos);
 }
 
 }  // namespace

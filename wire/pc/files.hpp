@@ -2,6 +2,8 @@
 // Writing files whole or not at all.
 #pragma once
 
+#include <unistd.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -45,6 +47,16 @@ inline void write_whole(const std::string& path, const std::string& text) {
     std::remove(part.c_str());
     throw UserError(Exit::usage, path + ": cannot be written (" + error.message() + "); choose another place.");
   }
+}
+
+/// Before work whose results go into a folder: makes it if it is missing. Throws UserError (usage) when nothing can be
+/// written there.
+inline void need_folder(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!fs::is_directory(path, error) || ::access(path.c_str(), W_OK) != 0)
+    refuse(path + ": cannot be written, or is no folder; choose another place.");
 }
 
 /// Before work whose result goes into a file: its folder must be there, and a file that is there stays unless `force`.

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "wire/pc/commit.hpp"
 #include "wire/pc/names.hpp"
 
 namespace wire::pc {
@@ -19,9 +20,12 @@ class Help : public CLI::Formatter {
   std::string make_option_opts(const CLI::Option* option) const override {
     if (option->get_positional()) return option->get_expected_max() > 1 ? " ..." : "";
     if (option->get_type_size() == 0) return "";
-    const std::string type = option->get_type_name();  // followed by what checks it
-    const std::string standard = option->get_default_str();
-    return " " + type.substr(0, type.find(':')) + (standard.empty() ? "" : " (" + standard + ")");
+    const std::string type = option->get_type_name();  // "TEXT:{0,1,both}": followed by what checks it
+    const std::string checks = type.find(':') == std::string::npos ? "" : type.substr(type.find(':') + 1);
+    const std::string takes = checks.rfind('{', 0) == 0 ? checks : plain(type.substr(0, type.find(':')));
+    std::string notes = option->get_default_str();
+    if (checks.find(" to ") != std::string::npos) notes += (notes.empty() ? "" : "; ") + checks;
+    return " " + takes + (notes.empty() ? "" : " (" + notes + ")");
   }
   std::string make_option_desc(const CLI::Option* option) const override {
     return wrapped(option->get_description(), columns - get_column_width());
@@ -32,6 +36,9 @@ class Help : public CLI::Formatter {
   }
 
  private:
+  static std::string plain(const std::string& type) {
+    return type == "TEXT" ? "WORD" : type == "FLOAT" ? "X" : type == "INT" || type == "UINT" ? "N" : type;
+  }
   static std::string wrapped(const std::string& text, std::size_t width) {
     std::string out;
     std::size_t line = 0, gap = 0;  // where the line begins; its last gap, 0: none
@@ -95,10 +102,12 @@ inline std::string unknown_command(const CLI::App& app) {
 /// Of seeds and counts: below it each is a whole number of its own in what a check reads.
 inline constexpr double most_seed = 1e15;
 
-/// `call`: how the program's help is asked for.
-inline void use_help(CLI::App& app, const std::string& call) {
+/// How a program shows its options, says which one it is, and answers a mistake.
+inline void use_help(CLI::App& app, const std::string& program) {
+  app.name(program);
   app.formatter(std::make_shared<Help>());
-  app.failure_message([call](const CLI::App* of, const CLI::Error& error) {
+  app.set_version_flag("--version", fmt::format("{}, commit {}", program, commit), "tell the commit it was built from");
+  app.failure_message([call = program + " --help"](const CLI::App* of, const CLI::Error& error) {
     const std::string command = unknown_command(*of);
     if (!command.empty()) return command + " " + call + " lists what there is.\n";
     const std::string hint = nearest_option(*of);

@@ -17,35 +17,36 @@ namespace {
 namespace fs = std::filesystem;
 
 enum class Need { must, may };
-enum class Range { positive, zero_or_more };
 
-/// One key of a motor file, in the units of motor sheets.
+/// One key of a motor file, in the units of motor sheets. What is outside of its range no motor is: a unit was
+/// mistaken.
 struct Key {
   const char* name;
   Need need;
-  Range range;
+  double low, high;
   double otherwise;  // value of a key that may be missing
 };
 
 // Defaults: the copper coefficient of IEC 60028, which is of 20 degC: taken at 25 degC it makes a winding of 155 degC
 // heat by 0.7 % too much, to the safe side; no phase coupling, which is the safe side too.
 constexpr Key keys[] = {
-    {"terminal_resistance_ohm", Need::must, Range::positive, 0},
-    {"terminal_inductance_mH", Need::must, Range::positive, 0},
-    {"saliency", Need::may, Range::positive, 1},  // Lq / Ld
-    {"torque_constant_mNm_per_A", Need::must, Range::positive, 0},
-    {"pole_pairs", Need::must, Range::positive, 0},
-    {"rotor_inertia_gcm2", Need::must, Range::positive, 0},
-    {"rated_current_A", Need::must, Range::positive, 0},
-    {"R1_K_per_W", Need::must, Range::positive, 0},
-    {"R2_K_per_W", Need::must, Range::positive, 0},
-    {"tau_winding_s", Need::must, Range::positive, 0},
-    {"tau_motor_s", Need::must, Range::positive, 0},
-    {"winding_max_degC", Need::must, Range::positive, 0},
-    {"copper_coefficient_per_K", Need::may, Range::zero_or_more, 0.00393},
-    {"phase_coupling_W_per_K", Need::may, Range::zero_or_more, 0},
+    {"terminal_resistance_ohm", Need::must, 1e-4, 1e4, 0},
+    {"terminal_inductance_mH", Need::must, 1e-5, 1e4, 0},
+    {"saliency", Need::may, 0.05, 20, 1},  // Lq / Ld
+    {"torque_constant_mNm_per_A", Need::must, 1e-3, 1e6, 0},
+    {"pole_pairs", Need::must, 1, 100, 0},
+    {"rotor_inertia_gcm2", Need::must, 1e-5, 1e9, 0},
+    {"rated_current_A", Need::must, 1e-3, 1e5, 0},
+    {"R1_K_per_W", Need::must, 1e-4, 1e4, 0},
+    {"R2_K_per_W", Need::must, 1e-4, 1e4, 0},
+    {"tau_winding_s", Need::must, 1e-2, 1e6, 0},
+    {"tau_motor_s", Need::must, 1e-2, 1e8, 0},
+    {"winding_max_degC", Need::must, 50, 300, 0},
+    {"copper_coefficient_per_K", Need::may, 0, 0.01, 0.00393},
+    {"phase_coupling_W_per_K", Need::may, 0, 1e3, 0},
 };
 constexpr const char* text_keys[] = {"name", "source", "status"};
+constexpr const char* surrogate = "surrogate";  // the one status there is
 
 double number(const toml::table& table, const std::string& path, const char* name) {
   const Key& key =
@@ -57,11 +58,17 @@ double number(const toml::table& table, const std::string& path, const char* nam
   }
   const auto value = node->value<double>();
   if (!value) refuse(fmt::format("{}: '{}' must be a number.", path, name));
-  const bool in_range = key.range == Range::positive ? *value > 0 : *value >= 0;
-  if (!in_range || !std::isfinite(*value)) {
-    refuse(fmt::format("{}: {} = {} cannot be; it must be a finite number {} zero.", path, name, *value,
-                       key.range == Range::positive ? "above" : "not below"));
-  }
+  if (!std::isgreaterequal(*value, key.low) || !std::islessequal(*value, key.high))  // quiet for NaN
+    refuse(
+        fmt::format("{}: {} = {:g} cannot be; of a motor it is {:g} to {:g}.", path, name, *value, key.low, key.high));
+  return *value;
+}
+
+std::string text(const toml::table& table, const std::string& path, const char* name, const std::string& otherwise) {
+  const toml::node* node = table.get(name);
+  if (node == nullptr) return otherwise;
+  const auto value = node->value<std::string>();
+  if (!value) refuse(fmt::format("{}: '{}' must be a text in quotes.", path, name));
   return *value;
 }
 
@@ -88,15 +95,17 @@ MotorFile read_motor(const std::string& which, const std::string& folder) {
 
   const auto get = [&](const char* name) { return number(table, path, name); };
   const double pole_pairs = get("pole_pairs");
-  if (pole_pairs != std::floor(pole_pairs) || pole_pairs > 100) {
-    refuse(fmt::format("{}: pole_pairs = {} must be a whole number from 1 to 100.", path, pole_pairs));
-  }
+  if (pole_pairs != std::floor(pole_pairs))
+    refuse(fmt::format("{}: pole_pairs = {} must be a whole number.", path, pole_pairs));
 
   MotorFile file;
   file.id = fs::path(path).stem().string();
-  file.name = table["name"].value_or(file.id);
-  file.source = table["source"].value_or(std::string("not stated"));
-  file.surrogate = table["status"].value_or(std::string()) == "surrogate";
+  file.name = text(table, path, "name", file.id);
+  file.source = text(table, path, "source", "not stated");
+  const std::string status = text(table, path, "status", "");
+  file.surrogate = status == surrogate;
+  if (!status.empty() && !file.surrogate)
+    refuse(fmt::format("{}: status = '{}' is none; say '{}' or leave it out.", path, status, surrogate));
 
   const double R1 = get("R1_K_per_W"), R2 = get("R2_K_per_W");
   const double inductance_d_H = get("terminal_inductance_mH") * 1e-3 / 2;

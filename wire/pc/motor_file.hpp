@@ -20,7 +20,8 @@ struct MotorFile {
 
 /// Reads a motor file. `which` is a path ending in .toml or the name of a file in `folder`.
 /// Throws UserError (usage) with the file, the key and what to do for: no such motor (the nearest is named), broken
-/// TOML, a misspelt key (the nearest is named), a missing key, a number that is not positive and finite.
+/// TOML, a misspelt key (the nearest is named), a missing key, a number that no motor has, another status than
+/// surrogate.
 MotorFile read_motor(const std::string& which, const std::string& folder);
 
 /// Names of the motor files in a folder, sorted.

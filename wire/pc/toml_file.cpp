@@ -55,7 +55,8 @@ void need_kind(const std::string& kind, const std::string& path, const toml::tab
       {"motor", "terminal_resistance_ohm",
        "'--motor {0}' of identify and of host-sim record, '--set motor={0}' of "
        "host-sim run take it"},
-      {"scene", "demand", "'host-sim run {}' takes it"}};
+      {"scene", "demand", "'host-sim run {}' takes it"},
+      {"parameter file", "axis0", "'hotcore restore {}' takes it"}};
   for (const Known& other : all) {
     if (kind == other.kind || !file.contains(other.key)) continue;
     refuse(fmt::format("{}: this is a {} and no {}; {}.", path, other.kind, kind,
@@ -64,6 +65,9 @@ void need_kind(const std::string& kind, const std::string& path, const toml::tab
 }
 
 toml::table parse_toml(const std::string& path) {
+  std::error_code none;
+  if (!fs::exists(path, none)) refuse(path + ": there is no such file; check the path.");
+  if (fs::is_directory(path, none)) refuse(path + ": this is a folder; name a file in it.");
   try {
     return toml::parse_file(path);
   } catch (const toml::parse_error& error) {

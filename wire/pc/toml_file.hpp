@@ -16,10 +16,11 @@ std::vector<std::string> toml_names(const std::string& folder);
 /// Throws UserError (usage) when there is no such file, naming the nearest.
 std::string find_toml(const std::string& kind, const std::string& which, const std::string& folder);
 
-/// A file of another kind ("heat model", "motor", "scene") is refused with what takes it: UserError (usage).
+/// A file of another kind ("heat model", "motor", "scene", "parameter file") is refused with what takes it: UserError
+/// (usage).
 void need_kind(const std::string& kind, const std::string& path, const toml::table& file);
 
-/// Throws UserError (usage) with file and line for broken TOML.
+/// Throws UserError (usage) where there is no such file, and with file and line for broken TOML.
 toml::table parse_toml(const std::string& path);
 
 }  // namespace wire::pc

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "boards/host/chip/play.hpp"
+#include "wire/pc/files.hpp"
 #include "wire/pc/help.hpp"
 #include "wire/pc/program.hpp"
 
@@ -18,21 +19,23 @@ const std::string root = HOTCORE_SOURCE_DIR;
 
 constexpr const char* examples =
     "Examples:\n"
-    "  chip jump                             the scene on the flash image; log and picture below ./out/chip/jump\n"
+    "  chip jump                             the scene on the flash image; log and picture: out/chip/jump\n"
     "  chip stall --set seconds=5 --json\n"
     "  chip jump --image build/h8-15d/bin/h8-15d.elf\n"
-    "Exit codes: 0 done, 2 the command line or a file is wrong, 3 the firmware made a mistake (it is printed).\n";
+    "Exit codes: 0 done, 2 the command line or a file is wrong, 3 the firmware made a mistake, which is\n"
+    "printed.\n";
 
 int run(const std::string& name, const std::vector<std::string>& overrides, const std::string& elf,
         const std::string& out, bool json) {
   using namespace boards;
   const host::Scene scene = host::read_scene(name, root + "/host-sim/scenes", overrides);
+  const std::string folder = out + "/" + scene.id;
+  wire::pc::need_folder(folder);
   const bool show = isatty(STDERR_FILENO) != 0;
   const ChipPlay play = play_on_chip(scene, elf, root + "/boards/motors", [&](double share) {
     if (show) fmt::print(stderr, "\r  {} on the chip model {:3.0f} %", scene.id, 100 * share);
   });
   if (show) fmt::print(stderr, "\r\033[K");
-  const std::string folder = out + "/" + scene.id;
   write_files(play.result, folder);
   const double speed = play.result.simulated_s / play.wall_s;
   if (json) {
@@ -64,11 +67,9 @@ int run(const std::string& name, const std::vector<std::string>& overrides, cons
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{
-      fmt::format("{}\nThe flash image of the H8-15D, executed instruction by instruction on a model of its chip.\n",
-                  examples),
-      "chip"};
-  wire::pc::use_help(app, "chip --help");
+  CLI::App app{fmt::format(
+      "{}\nThe flash image of the H8-15D, executed instruction by instruction on a model of its chip.\n", examples)};
+  wire::pc::use_help(app, "chip");
   std::string scene, elf = root + "/build/h8-15d/bin/h8-15d.elf", out = "out/chip";
   std::vector<std::string> overrides;
   bool json = false;

@@ -29,9 +29,9 @@ double counts_to_degC(double counts) {
 }  // namespace
 
 std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, const std::string& motor_folder) {
-  if (!std::filesystem::exists(elf)) {
-    wire::pc::refuse(elf + " is missing; build it with: cmake --preset h8-15d && cmake --build --preset h8-15d");
-  }
+  if (std::error_code none; !std::filesystem::is_regular_file(elf, none))
+    wire::pc::refuse(elf +
+                     ": there is no such image; build it with: cmake --preset h8-15d && cmake --build --preset h8-15d");
   if (scene.board != "h8-15d")
     wire::pc::refuse("The chip model has the board h8-15d only; use host-sim for " + scene.board + ".");
   const wire::pc::MotorFile file = wire::pc::read_motor(scene.motor, motor_folder);
@@ -45,6 +45,7 @@ std::unique_ptr<Pcb> board_of(const host::Scene& scene, const std::string& elf, 
   const firmware::AxisSet set{
       firmware::parameters_from(known, h8_15d::rating, {static_cast<float>(scene.supply_V), 0.0f}),
       firmware::heat_parameters_from(known, trust_of(scene))};
+  host::need_drivable(scene.motor, set, h8_15d::rating);
   pcb->flash_parameters({set, set});
   for (int axis = 0; axis < 2; ++axis) pcb->bench.load(axis) = load_of(scene.shaft);
   return pcb;

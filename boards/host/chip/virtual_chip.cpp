@@ -34,11 +34,10 @@ int main(int argc, char** argv) {
       "  virtual-chip                  the board on USB/IP port 3240, until Ctrl-C\n"
       "  virtual-chip --port 0         any port that is free (it is printed)\n"
       "  kill -HUP PID                 its power goes and comes back\n"
-      "Exit codes: 0 done, 2 the command line or a file is wrong, 3 the firmware made a mistake (it is printed),\n"
-      "4 the image has no USB, 6 the port is taken.\n"
-      "The flash image of the H8-15D on a model of its chip, as a USB device that a kernel can attach.\n",
-      "virtual-chip"};
-  wire::pc::use_help(app, "virtual-chip --help");
+      "Exit codes: 0 done, 2 the command line or a file is wrong, 3 the firmware made a mistake (it is\n"
+      "printed), 4 the image has no USB, 6 the port is taken.\n"
+      "The flash image of the H8-15D on a model of its chip, as a USB device that a kernel can attach.\n"};
+  wire::pc::use_help(app, "virtual-chip");
   std::string elf = root + "/build/h8-15d/bin/h8-15d.elf", scene = "jump";
   std::uint16_t port = boards::usb::usbip_port;
   bool json = false;

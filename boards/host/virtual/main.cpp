@@ -81,13 +81,11 @@ int main(int argc, char** argv) {
       "  virtual-board                 a board on USB/IP port 3240, until Ctrl-C\n"
       "  virtual-board --chip          the flash image on the chip model instead of the host build\n"
       "  virtual-board --port 0        any port that is free (it is printed)\n"
-      "  virtual-board --json          {\"serial\", \"bus_id\", \"host\", \"port\", \"attach\"} in one line, once it "
-      "serves\n"
+      "  virtual-board --json          serial, bus_id, host, port, attach in one line, once it serves\n"
       "  kill -HUP PID                 its power goes and comes back\n"
       "Exit codes: 0 done, 2 the command line or a file is wrong, 6 the port is taken.\n"
-      "A board that isn't there, as a USB device that a kernel can attach.\n",
-      "virtual-board"};
-  wire::pc::use_help(app, "virtual-board --help");
+      "A board that isn't there, as a USB device that a kernel can attach.\n"};
+  wire::pc::use_help(app, "virtual-board");
   std::string motor = "ec-16-40w", serial = "SIM0";
   std::uint16_t port = usb::usbip_port;
   bool chip = false, json = false;

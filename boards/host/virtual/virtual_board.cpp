@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "boards/dual_48v_20a.hpp"
+#include "boards/host/stage.hpp"
 #include "firmware/version.hpp"
 #include "wire/pc/user_error.hpp"
 
@@ -41,6 +42,7 @@ VirtualBoard::VirtualBoard(const VirtualBoardOptions& options)
 void VirtualBoard::save_parameters_of_motor() {
   const firmware::AxisSet set{firmware::parameters_from(options_.motor, rating, {48.0f, 0.0f}),
                               firmware::heat_parameters_from(options_.motor, thermal::sheet_trust)};
+  need_drivable("This motor", set, rating);
   firmware::ParameterStore workshop(rating);
   firmware::Driver driver(setup_from({}));
   wire::Answer answer = workshop.start(flash_);
@@ -55,8 +57,7 @@ void VirtualBoard::save_parameters_of_motor() {
   }
   if (answer.status == 0) return;
   const wire::CodeText text = wire::text_of(answer.status);
-  wire::pc::refuse(fmt::format("This motor cannot be driven by the virtual board: parameter 0x{:04X}: {}; {}.",
-                               answer.id, text.happened, text.advice));
+  wire::pc::refuse(fmt::format("This motor's parameters are not saved: {}; {}.", text.happened, text.advice));
 }
 
 void VirtualBoard::power_cycle() {
@@ -88,6 +89,7 @@ void VirtualBoard::advance(int periods) {
       driver_->watch();
       usb_->bus.frame();
       usb_->link.work(flash_);
+      if (!usb_->link.looks_ahead()) driver_->look_ahead();  // one at a time, as on the H8-15D
     }
     if (periods_ % slow_periods == 0) driver_->slow_tick(plant_->slow(), {plant_->slow(0), plant_->slow(1)});
   }
