@@ -3,6 +3,7 @@
 
 #include <iterator>
 
+#include "thermal/flip_sum.hpp"
 #include "thermal/validate.hpp"
 
 namespace firmware {
@@ -111,10 +112,18 @@ wire::Answer check(const ParameterSet& set, const BoardRating& rating) {
   return {};
 }
 
+std::uint32_t ParameterStore::Kept::sum_now() const {
+  thermal::FlipSum all;
+  for (const AxisSet& axis : set.axes) {
+    for (int i = 0; i < parameter_count; ++i) all.add(field(axis, i));
+  }
+  return all.word();
+}
+
 wire::Status ParameterStore::get(const wire::Address& of, float& value) const {
   const int index = index_of(of.id);
   if (index < 0 || of.axis >= axis_count) return wire::Status::unknown_parameter;
-  value = field(in_force_.axes[of.axis], index);
+  value = field(in_force_.set.axes[of.axis], index);
   return wire::Status::done;
 }
 
@@ -125,7 +134,9 @@ wire::Answer ParameterStore::stage(const wire::Assignment& one) {
   const wire::ParameterInfo& info = *parameter_info(index);
   const bool taken_back = wire::is_unset(one.value) && wire::is_unset(info.fallback);
   if (!taken_back && !info.holds(one.value)) return wire::refused(wire::Status::parameter_refused, axis, id);
-  field(staged_.axes[axis], index) = one.value;
+  if (!staged_.whole()) return wire::refused(wire::Status::memory_changed, axis, id);
+  field(staged_.set.axes[axis], index) = one.value;
+  staged_.seal();
   return {};
 }
 
@@ -135,12 +146,16 @@ wire::Answer ParameterStore::load(wire::LoadFrom from) {
       staged_ = in_force_;
       return {};
     case wire::LoadFrom::defaults:
-      staged_ = {};
+      staged_.set = {};
+      staged_.seal();
       return {};
     default: {
       ParameterSet saved;
       const wire::Answer answer = decode(saved);
-      if (answer.status == 0) staged_ = saved;
+      if (answer.status == 0) {
+        staged_.set = saved;
+        staged_.seal();
+      }
       return answer;
     }
   }
@@ -148,10 +163,11 @@ wire::Answer ParameterStore::load(wire::LoadFrom from) {
 
 wire::Answer ParameterStore::commit(Driver& driver) {
   if (!driver.at_rest()) return wire::refused(wire::Status::not_disarmed);
-  const wire::Answer against = check(staged_, rating_);
+  if (!staged_.whole()) return wire::refused(wire::Status::memory_changed);
+  const wire::Answer against = check(staged_.set, rating_);
   if (against.status != 0) return against;
   for (int i = 0; i < axis_count; ++i) {
-    const AxisSet &old = in_force_.axes[i], &now = staged_.axes[i];
+    const AxisSet &old = in_force_.set.axes[i], &now = staged_.set.axes[i];
     driver.configure(i, setup_from(now), same_heat(old, now) ? HeatModel::unchanged : HeatModel::changed);
   }
   in_force_ = staged_;
@@ -160,21 +176,22 @@ wire::Answer ParameterStore::commit(Driver& driver) {
 
 wire::Answer ParameterStore::against_saving(const Driver& driver) const {
   if (!driver.at_rest()) return wire::refused(wire::Status::not_disarmed);
+  if (!whole()) return wire::refused(wire::Status::memory_changed);
   if (saved_count() > most_saved) return wire::refused(wire::Status::too_much_found);
-  return check(in_force_, rating_);
+  return check(in_force_.set, rating_);
 }
 
 bool ParameterStore::unsaved() const {
   ParameterSet saved;
-  return decode(saved).status != 0 || !same(saved, in_force_);
+  return decode(saved).status != 0 || !same(saved, in_force_.set);
 }
 
-bool ParameterStore::uncommitted() const { return !same(staged_, in_force_); }
+bool ParameterStore::uncommitted() const { return !same(staged_.set, in_force_.set); }
 
 bool ParameterStore::saved(int index) const {
   if (index < always_saved) return true;
   const float fallback = parameter_info(index)->fallback;
-  return !same(field(in_force_.axes[0], index), fallback) || !same(field(in_force_.axes[1], index), fallback);
+  return !same(field(in_force_.set.axes[0], index), fallback) || !same(field(in_force_.set.axes[1], index), fallback);
 }
 
 int ParameterStore::saved_count() const {
@@ -197,7 +214,7 @@ std::span<std::uint32_t> ParameterStore::encode(Record& record) const {
   const int id_words = (count + 1) / 2;
   std::memcpy(word, ids, 4 * static_cast<std::size_t>(id_words));
   word += id_words;
-  for (const AxisSet& set : in_force_.axes) {
+  for (const AxisSet& set : in_force_.set.axes) {
     for (int i = 0; i < parameter_count; ++i) {
       if (saved(i)) std::memcpy(word++, &field(set, i), 4);
     }

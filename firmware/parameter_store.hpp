@@ -50,7 +50,10 @@ class ParameterStore {
   static constexpr std::size_t record_words = parameter_record_words(most_saved);
   static_assert(4 * record_words <= slot_bytes, "as many parameters as a slot holds");
 
-  explicit ParameterStore(const BoardRating& rating) : rating_(rating) {}
+  explicit ParameterStore(const BoardRating& rating) : rating_(rating) {
+    in_force_.seal();
+    staged_.seal();
+  }
 
   /// Once, before the watchdogs run (it may erase): puts the saved set in force. What the answer refuses must not be
   /// driven: hand its finding to Driver::hold.
@@ -58,14 +61,17 @@ class ParameterStore {
   wire::Answer start(S& store) {
     log_.find(store);
     log_.make_room(store);
-    wire::Answer answer = decode(in_force_);
-    if (answer.status == 0) answer = check(in_force_, rating_);
+    wire::Answer answer = decode(in_force_.set);
+    if (answer.status == 0) answer = check(in_force_.set, rating_);
+    in_force_.seal();
     staged_ = in_force_;
     return answer;
   }
 
-  const ParameterSet& in_force() const { return in_force_; }
-  const ParameterSet& staged() const { return staged_; }
+  const ParameterSet& in_force() const { return in_force_.set; }
+  /// No bit of it has flipped.
+  bool whole() const { return in_force_.whole(); }
+  const ParameterSet& staged() const { return staged_.set; }
 
   /// The value in force.
   wire::Status get(const wire::Address& of, float& value) const;
@@ -103,6 +109,15 @@ class ParameterStore {
   using Record = std::uint32_t[record_words];
   static constexpr std::uint32_t version = 1;
 
+  /// They lie here for hours until a commit or a save: what flips in one meanwhile must become neither.
+  struct Kept {
+    ParameterSet set;
+    std::uint32_t sum = 0;
+    std::uint32_t sum_now() const;
+    void seal() { sum = sum_now(); }
+    bool whole() const { return sum == sum_now(); }
+  };
+
   bool saved(int index) const;
   int saved_count() const;
   std::span<std::uint32_t> encode(Record& record) const;
@@ -111,7 +126,7 @@ class ParameterStore {
 
   BoardRating rating_;
   RecordLog log_{0x52415048, slot_bytes};  // "HPAR"
-  ParameterSet in_force_, staged_;
+  Kept in_force_, staged_;
 };
 
 }  // namespace firmware

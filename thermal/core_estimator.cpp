@@ -118,7 +118,9 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
 void CoreEstimator::step() {
   input_[Boundary::ambient] = ambient_degC_;
   step_uncertainty();
+  meet_copy();
   degC_ = network_.step(transition_, degC_, input_);
+  keep_copy();
   const double behind_K = sensed_degC(degC_[housing_.node]) - sensor_degC_;
   const double moved_K = behind_K / (1.0 + housing_.lag_s / dt_s);
   uncertainty_.step_lag(behind_K, moved_K);
@@ -174,7 +176,9 @@ void CoreEstimator::meet_sensor(float reading_degC) {
 /// The minute is over, and a start that was a guess would contradict the sensor for hours: it is as cold as it reads,
 /// with what is left as margin.
 void CoreEstimator::doubt(float left_K) {
+  meet_copy();
   degC_.array() -= static_cast<double>(left_K);
+  keep_copy();
   sensor_degC_ -= static_cast<double>(left_K);
   watch_.model_corrected(-left_K);
   doubted_K_.head(n_).array() += left_K;
@@ -314,7 +318,9 @@ CoreEstimator::Row CoreEstimator::margins_K() const {
 void CoreEstimator::settle(int steps) {
   if (due_steps_ <= 0 || steps <= 0) return;
   const float part = static_cast<float>(steps) / static_cast<float>(due_steps_);
+  meet_copy();
   for (int i = 0; i < n_; ++i) degC_[i] += static_cast<double>(part * due_K_[i]);
+  keep_copy();
   ambient_degC_ += static_cast<double>(part * due_K_[ambient()]);
   sensor_degC_ += static_cast<double>(part * due_K_[sensor()]);
   watch_.model_corrected(part * due_K_[sensor()]);
@@ -328,6 +334,7 @@ void CoreEstimator::raise_to(float winding_degC) {
   for (int i = 0; i < n_; ++i) {
     if (has_limit(i) && !(degC_[i] >= static_cast<double>(winding_degC))) degC_[i] = static_cast<double>(winding_degC);
   }
+  keep_copy();
   publish();
 }
 
@@ -499,12 +506,35 @@ void CoreEstimator::start_hotter() {
   flags_ = state_restored;
 }
 
+/// A bit that flips in the middle of a call, which takes a millisecond, no sum shows: it would pass for the result. The
+/// hotter of both is true.
+void CoreEstimator::meet_copy() {
+  if (!possible()) return;  // guard_state knows better
+  for (int i = 0; i < n_; ++i) {
+    const double copy = good_degC_.data()[i];  // its size is in no sum
+    if (degC_[i] == copy) continue;
+    if (degC_[i] < copy) degC_[i] = copy;
+    flags_ |= state_restored;
+  }
+}
+
+void CoreEstimator::keep_copy() {
+  if (possible()) good_degC_ = degC_;
+}
+
+bool CoreEstimator::possible() const {
+  for (int i = 0; i < n_; ++i) {
+    if (!plausible(degC_[i])) return false;
+  }
+  return true;
+}
+
 /// A state that is not finite or not possible is replaced by the last good one, hotter, and says so for one call. What
 /// has a limit and was not too cold may have been as hot as it seemed: it is at its limit at least.
 void CoreEstimator::guard_state() {
-  bool good =
-      plausible(ambient_degC_) && plausible(sensor_degC_) && std::abs(uncertainty_.late_K()) < hottest_possible_degC;
-  for (int i = 0; i < n_; ++i) good = good && plausible(degC_[i]);
+  meet_copy();
+  const bool good = possible() && plausible(ambient_degC_) && plausible(sensor_degC_) &&
+                    std::abs(uncertainty_.late_K()) < hottest_possible_degC;
   for (int i = 0; i < uncertainty_.size(); ++i) {
     if (!(std::abs(doubted_K_[i]) < 1e3f)) doubted_K_[i] = most_sigma_K;
     if (!(std::abs(kept_K_[i]) < 1e3f)) kept_K_[i] = 0.0f;

@@ -156,6 +156,9 @@ class CoreEstimator {
   std::uint32_t state_sum() const;
   const Estimate& give_up();
   void start_hotter();
+  bool possible() const;
+  void meet_copy();
+  void keep_copy();
   void guard_state();
   void publish();
   float due_above_K(int node) const { return due_margin_K_[node] > 0.0f ? due_margin_K_[node] : 0.0f; }
@@ -173,7 +176,7 @@ class CoreEstimator {
   float max_degC_[max_nodes];
 
   Uncertainty uncertainty_;
-  Vector degC_, good_degC_;
+  Vector degC_, good_degC_;  // the latter: the last that was possible, kept wherever the first is written
   double ambient_degC_, good_ambient_degC_, sensor_degC_;  // the latter: what it reads, lag and all
   bool ambient_known_ = false;                             // measured
   HeatInput<> input_;

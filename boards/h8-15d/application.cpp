@@ -104,7 +104,7 @@ void Application::follow_commit() {
   for (int i = 0; good_ && i < 2; ++i) {
     const firmware::AxisParameters& p = parameters_.in_force().axes[i].drive;
     const std::uint32_t now[2] = {firmware::bits(p.pole_pairs_count), firmware::bits(p.angle_offset_rad)};
-    if (std::memcmp(now, found_with_[i], sizeof now) == 0) continue;
+    if (std::memcmp(now, found_with_[i], sizeof now) == 0 || !parameters_.whole()) continue;
     std::memcpy(found_with_[i], now, sizeof now);
     const Priority& index_irq = i == 0 ? index0_irq : index1_irq;
     hold_off(index_irq);
@@ -185,6 +185,7 @@ void Application::run() {
 
 void Application::every_ms(std::uint32_t ms) {
   driver_.watch();  // before new setpoints: the last ones have settled
+  for (int i = 0; i < 2; ++i) stage_.watch_encoder_zero(i);
   read_slow_channel();
   look_at_door();
   link_.work(parameter_flash_);
@@ -236,7 +237,7 @@ void Application::read_slow_channel() {
       power_stage_ = temperature_of(counts);
       break;
     default: {
-      const int which = force_axis_;
+      const int which = force_axis_ & 1;  // whatever flips, nothing else is written to
       door.force_V[which] = static_cast<float>(counts) * vdda_V / adc_counts;
       force_axis_ = 1 - which;
       write_pin(force_select, force_axis_ == 1);  // settles until its turn comes again

@@ -53,7 +53,7 @@ class Application {
   wire::Answer obey_order(const Door& in);
   void remember();
 
-  FlashStore parameter_flash_{parameter_sectors};
+  FlashStore<parameter_sectors> parameter_flash_;
   firmware::ParameterStore parameters_{rating};
   wire::Answer found_;  // what the saved parameters were worth
   firmware::Driver driver_;

@@ -39,7 +39,7 @@ class HeatKeeper {
  private:
   using Record = std::uint32_t[record_words];
 
-  FlashStore flash_{journal_sectors};
+  FlashStore<journal_sectors> flash_;
   firmware::RecordLog log_{magic, slot_bytes};
   Record records_[2] = {};
   std::atomic<int> newest_{-1};  // of records_; -1: none yet

@@ -32,10 +32,18 @@ class PowerStage {
   void stop_sampling();
 
   /// Rotor: counter value that is mechanical zero; written by the index interrupt.
-  void set_encoder_zero(int axis, std::uint32_t counter) { encoder_zero_[axis] = counter; }
+  void set_encoder_zero(int axis, std::uint32_t counter) {
+    encoder_zero_[axis] = counter;
+    zero_turned_[axis] = ~counter;
+  }
   std::uint32_t encoder_zero(int axis) const { return encoder_zero_[axis]; }
   void distrust_encoder(int axis) { encoder_good_[axis] = false; }
   void trust_encoder(int axis) { encoder_good_[axis] = true; }
+  /// A bit of the zero that flips turns the field of a motor that stands, and nothing else would show it. Main loop.
+  void watch_encoder_zero(int axis) {
+    const std::uint32_t zero = encoder_zero_[axis], turned = zero_turned_[axis];
+    if (zero != ~turned && zero == encoder_zero_[axis]) distrust_encoder(axis);  // else the index pulse came in between
+  }
 
   /// Slow conversions ride behind the fast ones: ask, then fetch some periods later. Main loop.
   void ask_slow(std::uint32_t channel) { slow_wanted_ = static_cast<std::uint8_t>(channel | 0x80u); }
@@ -62,7 +70,7 @@ class PowerStage {
   bool wanted_on_[2] = {}, broken_[2] = {};
   bool complete_ = false;
   volatile bool encoder_good_[2] = {};
-  volatile std::uint32_t encoder_zero_[2] = {};
+  volatile std::uint32_t encoder_zero_[2] = {}, zero_turned_[2] = {~0u, ~0u};
   std::uint32_t zero_seen_[2] = {};
   std::uint32_t sequence_[2] = {}, cycles_[2] = {}, lost_[2] = {};
   int armed_ = 0;

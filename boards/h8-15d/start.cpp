@@ -20,14 +20,16 @@ void adc_handler();
 void usb_handler();
 void systick_handler();
 [[noreturn]] void unexpected_handler();
+
+alignas(h8_15d::Application) unsigned char application_storage[sizeof(h8_15d::Application)];
 }
 
 namespace {
 
 using namespace h8_15d;
 
-alignas(Application) unsigned char application_storage[sizeof(Application)];
-Application* application = nullptr;
+/// No pointer to it: a flipped one would let every interrupt work on what is none. Not before it is built.
+Application& application() { return *std::launder(reinterpret_cast<Application*>(application_storage)); }
 
 [[noreturn]] void sleep_for_ever() {
   for (;;) asm volatile("wfi");
@@ -56,9 +58,9 @@ extern "C" {
   bring_up_backup_ram();
   bring_up_cycle_counter();
   if (clock_good) bring_up_encoders();
-  application = new (application_storage) Application();
-  application->prepare(reset_flags, clock_good);
-  application->run();
+  new (application_storage) Application();
+  application().prepare(reset_flags, clock_good);
+  application().run();
 }
 
 /// The crystal stopped (CSS). The break has opened the bridges by itself; start again from HSI and stay disarmed.
@@ -83,22 +85,22 @@ void unexpected_handler() {
 
 void pvd_handler() {
   reg(exti::pr) = bit(16);
-  application->supply_falls();
+  application().supply_falls();
 }
 
 void index0_handler() {
   reg(exti::pr) = bit(3);
-  application->index(0);
+  application().index(0);
 }
 
 void index1_handler() {
   reg(exti::pr) = bit(8);
-  application->index(1);
+  application().index(1);
 }
 
-void adc_handler() { application->control(); }
-void usb_handler() { application->usb(); }
-void systick_handler() { application->tick(); }
+void adc_handler() { application().control(); }
+void usb_handler() { application().usb(); }
+void systick_handler() { application().tick(); }
 
 // RM0090 12.2, Table 61.
 using Vector = void (*)();

@@ -48,6 +48,7 @@ class Chip final : public Host, public Bus {
   /// Loads an ELF image; its symbols become known. Throws std::runtime_error on a file that is none.
   void load(const std::string& elf);
   std::uint32_t symbol(const std::string& name) const;  // 0: unknown
+  const std::map<std::string, std::uint32_t>& symbols() const { return symbols_; }
   std::string function_at(std::uint32_t pc) const;
 
   void connect(Board* board) { board_ = board; }

@@ -71,6 +71,8 @@ std::uint32_t Core::reg(int id) const {
 }
 void Core::set(int id, std::uint32_t value) { uc_reg_write(uc_, id, &value); }
 
+std::uint32_t Core::stack_pointer() const { return reg(UC_ARM_REG_SP); }
+
 std::uint32_t Core::word(std::uint32_t address) const {
   std::uint32_t v = 0;
   uc_mem_read(uc_, address, &v, 4);

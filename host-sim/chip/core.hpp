@@ -72,6 +72,7 @@ class Core {
   bool locked_up() const { return locked_up_; }
   const std::string& semihost_text() const { return text_; }
   std::uint32_t pc() const { return block_; }
+  std::uint32_t stack_pointer() const;
   std::uint64_t instructions() const { return instructions_; }
   Time slept() const { return slept_; }
 

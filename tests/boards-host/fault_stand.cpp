@@ -64,6 +64,14 @@ Design design_of(const std::string& motor, Scenes scene, double seconds, host_si
   return d;
 }
 
+double largest_demand_Nm(const Design& design, int axis) {
+  double most_A = 0;
+  for (const boards::host::Demand& d : design.scene.demands) {
+    if (d.axis == axis) most_A = std::max(most_A, std::abs(d.current_A) * (1 + d.ripple_ratio));
+  }
+  return 1.5 * design.truth.pole_pairs * design.truth.flux_linkage_Wb * most_A;
+}
+
 void tell_the_truth(Design& d) {
   d.known = host_sim::true_sheet(d.truth, host_sim::heat_from_sheet(d.truth));
   d.estimator.trust = thermal::exact_trust;
@@ -174,17 +182,9 @@ void Stand::step() {
   period();
 }
 
-double Stand::largest_demand_Nm(int axis) const {
-  double most_A = 0;
-  for (const boards::host::Demand& d : design_.scene.demands) {
-    if (d.axis == axis) most_A = std::max(most_A, std::abs(d.current_A) * (1 + d.ripple_ratio));
-  }
-  return 1.5 * design_.truth.pole_pairs * design_.truth.flux_linkage_Wb * most_A;
-}
-
 Stand::Outcome Stand::play(const std::function<void(Stand&)>& fault, const Watch& evident, const Watch& reacted) {
   Outcome out;
-  const double whole_Nm = largest_demand_Nm(0);
+  const double whole_Nm = largest_demand_Nm(design_, 0);
   double end_s = design_.scene.seconds;
   bool broken = false;
   while (time_s() < end_s) {

@@ -36,6 +36,8 @@ inline constexpr double peak_A = 20;  // the board's
 
 /// What a scene asks of a motor; a large one is warm already, or the push would not last. The firmware is not told yet.
 Design design_of(const std::string& motor, Scenes scene, double seconds, host_sim::Random& random);
+/// What the largest demand on an axis makes.
+double largest_demand_Nm(const Design& design, int axis);
 /// The firmware knows the motor.
 void tell_the_truth(Design& design);
 
@@ -69,7 +71,6 @@ class Stand {
   double worst_current_error_A() const;        // of a phase's reading
   double angle_error_rad() const;              // of the encoder, electrical
   double phase_missed_A() const;               // the most that was permitted for a phase in which nothing flows
-  double largest_demand_Nm(int axis) const;
   double short_A() const { return std::abs(bench.bridge(0).short_A()); }  // between two leads
 
   struct Outcome {

@@ -2,6 +2,8 @@
 // What goes wrong on a board while both bridges run: a lane hangs, a sensor or a converter fails, counts are lost. The
 // image has to open its gates in the time that the safety figures allow, and must not drive before it is ready.
 #include <cmath>
+#include <cstring>
+#include <string>
 
 #include "tests/chip/image.hpp"
 
@@ -154,6 +156,45 @@ TEST(Guards, AReferenceThatIsOffByTenPercentOpensTheGates) {  // then every othe
   pcb->chip.adc1.force(17, 1502 * 10 / 9);
   EXPECT_LT(opens_after_s(*pcb, 0.1), 0.02);
   EXPECT_NEAR(pcb->door().vdda_V, 2.97, 0.01);
+}
+
+/// Of the application's, by the image's symbol table.
+std::uint8_t* part(Pcb& pcb, const std::string& name) {
+  const std::uint32_t place = pcb.chip.symbol("application_storage") + pcb.chip.symbol("part " + name);
+  return pcb.chip.core().ram() + (place - Core::ram_base);
+}
+
+TEST(Guards, AFlippedZeroOfAnEncoderOpensItsBridge) {
+  NEEDS_IMAGE(image);
+  for (const int axis : {0, 1}) {
+    auto pcb = driving();
+    part(*pcb, "stage_.encoder_zero_")[4 * axis + 1] ^= 4;  // a quarter of a turn
+    hold(*pcb, 4.0f, 4.0f, 0.01);
+    EXPECT_FALSE(pcb->duty(axis).on);
+    EXPECT_TRUE(pcb->duty(1 - axis).on);
+  }
+}
+
+// The sums are compared before; what flips then would pass for the result.
+TEST(Guards, ATemperatureThatFlipsInTheMiddleOfTheSlowLaneComesBack) {
+  NEEDS_IMAGE(image);
+  auto pcb = driving();
+  const float before_degC = pcb->door().axis[0].core_degC[0];
+  const double until_s = to_s(pcb->chip.now()) + 0.02;
+  const auto works = [&] {
+    return pcb->chip.function_at(pcb->chip.pc()).find("Uncertainty4step") != std::string::npos;
+  };
+  while (!works() && to_s(pcb->chip.now()) < until_s) pcb->run_for(1e-6);
+  ASSERT_TRUE(works());
+  std::uint8_t* const at = part(*pcb, "driver_.axes_[0].core_.degC_");
+  double degC;
+  std::memcpy(&degC, at, sizeof degC);
+  ASSERT_NEAR(degC, static_cast<double>(before_degC), 1.0) << "axis 0 comes first";
+  at[6] ^= at[6] & 0x40 ? 0x40 : 0x10;  // of the exponent: a sixteenth above 32 degC, half below
+  std::memcpy(&degC, at, sizeof degC);
+  ASSERT_LT(degC, static_cast<double>(before_degC) - 5.0);
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  EXPECT_GT(pcb->door().axis[0].core_degC[0], before_degC - 1.0f);
 }
 
 TEST(Guards, AnEncoderThatLostCountsIsFoundAtTheIndex) {

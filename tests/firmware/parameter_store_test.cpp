@@ -212,6 +212,30 @@ TEST(ParameterStore, NothingIsCommittedOrSavedWhileAnAxisIsArmedOrAboutToBe) {
   EXPECT_EQ(b.store.save(b.driver, b.flash).status, 0);
 }
 
+TEST(ParameterStore, WhatFlipsInASetIsNeitherCommittedNorSaved) {
+  const auto flip = [](const firmware::ParameterSet& set) {  // R1 a quarter, which is in its range
+    auto& word = const_cast<float&>(set.axes[1].heat.R1_K_per_W);
+    word = std::bit_cast<float>(std::bit_cast<std::uint32_t>(word) ^ 1u << 24);
+  };
+  Bench b;
+  b.put_in_force();
+  flip(b.store.staged());
+  EXPECT_EQ(b.store.stage({{0x0203, 0}, 5.0f}).status, code(Status::memory_changed));
+  EXPECT_EQ(b.store.commit(b.driver).status, code(Status::memory_changed));
+  b.store.take_back();
+  EXPECT_EQ(b.store.commit(b.driver).status, 0);
+  b.tick(1);
+
+  ASSERT_EQ(b.store.save(b.driver, b.flash).status, 0);
+  flip(b.store.in_force());
+  EXPECT_EQ(b.store.save(b.driver, b.flash).status, code(Status::memory_changed));
+  b.store.take_back();
+  EXPECT_EQ(b.store.commit(b.driver).status, code(Status::memory_changed)) << "what is taken back flipped as well";
+  EXPECT_EQ(b.store.load(wire::LoadFrom::saved).status, 0);
+  EXPECT_EQ(b.store.commit(b.driver).status, 0);
+  EXPECT_TRUE(b.store.whole());
+}
+
 TEST(ParameterStore, TheTemperaturesSurviveACommit) {
   Bench b;
   b.put_in_force();
