@@ -40,14 +40,14 @@ check "the prompt without a board: exit code 4, one line" "$? $(wc -l <<<"$said"
 
 # paragraph COMMAND: what the manual says of it.
 paragraph() { sed 's/\\-/-/g; s/\\f.//g' "$manual" | awk -v c="$1" '/^\.TP/ { on = 0; getline; on = $2 == c } on'; }
-untold=""
+untold="" plain=$(sed 's/\\-/-/g' "$manual")  # no pipe: grep -q that ends first would break it
 for o in $("$hotcore" --help | sed -n 's/^  \(--[a-z]*\).*/\1/p'); do
-  sed 's/\\-/-/g' "$manual" | grep -q "^\.BI\? $o\b" || untold+=" $o"
+  grep -q "^\.BI\? $o\b" <<<"$plain" || untold+=" $o"
 done
 for c in $("$hotcore" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
   [ -n "$(paragraph "$c")" ] || untold+=" $c"
   for o in $("$hotcore" "$c" --help | sed -n 's/^  \(-h,\)\{0,1\}\(--[a-z]*\).*/\2/p' | grep -v '^--help$'); do
-    paragraph "$c" | grep -q -- "$o\b" || untold+=" '$c $o'"
+    grep -q -- "$o\b" <<<"$(paragraph "$c")" || untold+=" '$c $o'"
   done
 done
 check "commands and options that hotcore.1 does not tell" "$untold" ""
