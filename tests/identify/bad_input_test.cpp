@@ -57,9 +57,11 @@ void refused(const std::string& path, const std::string& because) {
 }
 
 TEST(BadInput, AGoodLogIsAnsweredUntilItIsSpoilt) {
-  const Outcome r = run(spoilt([](auto&, int) { return true; }) + " --motor ec-16-40w");
+  const std::string good = spoilt([](auto&, int) { return true; }) + " --motor ec-16-40w";
+  const Outcome r = run(good);
   EXPECT_EQ(r.code, 0);
   says(r.out, "Verdict: adequate");
+  says(run(good + " --averaged").out, "since the row before it: it was said that they are averaged");
 }
 
 TEST(BadInput, ReadingsHeldOverFasterRowsCountOnce) {

@@ -423,24 +423,18 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(wire::pc::between(0, 100));
   app.add_flag("--mostly-small", a.mostly_small, "sizes of 1..10 K even in their logarithm: half below 3.2 K");
-  app.add_option("--detect", a.margins.detect, "evidence asked for a first cause")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
-  app.add_option("--second", a.margins.second, "for a second one")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
-  app.add_option("--tie", a.margins.tie, "lead asked for a name of two causes")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
-  app.add_option("--tie-alone", a.margins.tie_alone, "lead asked for a name of one")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
-  app.add_option("--worth", a.margins.worth_K, "K that a first cause must move")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
-  app.add_option("--noticeable", a.margins.noticeable_K, "K that a second one must move")
-      ->capture_default_str()
-      ->check(wire::pc::between(0, 1e6));
+  const struct {
+    const char* option;
+    double* margin;
+    const char* what;
+  } margins[] = {{"--detect", &a.margins.detect, "evidence asked for a first cause"},
+                 {"--second", &a.margins.second, "for a second one"},
+                 {"--tie", &a.margins.tie, "lead asked for a name of two causes"},
+                 {"--tie-alone", &a.margins.tie_alone, "lead asked for a name of one"},
+                 {"--worth", &a.margins.worth_K, "K that a first cause must move"},
+                 {"--noticeable", &a.margins.noticeable_K, "K that a second one must move"}};
+  for (const auto& [option, margin, what] : margins)
+    app.add_option(option, *margin, what)->capture_default_str()->check(wire::pc::between(0, 1e6));
   auto* quick = app.add_flag("--quick", a.quick, "answers only: no gain, no parameters' rivals, no experiments");
   app.add_flag("--blind", a.blind, "identify is given no motor sheet")->needs(quick);
   app.add_flag("--check", a.check, "end with an error where what is held is missed");
