@@ -22,7 +22,7 @@ using wire::pc::UserError;
 
 struct Options {
   std::string serial;
-  std::string motor = link::SimulatedBoard{}.motor;
+  std::string motor = link::SimulatedBoard{}.motor, motor_folder;
   bool sim = false, json = false;
 };
 

@@ -19,15 +19,6 @@ using wire::pc::refuse;
 
 constexpr double probe_s = 0.12;  // the ohmmeter needs 0.1 s, and a setpoint may come 5 ms late
 
-double value_of(const Values& values, const std::string& name) {
-  const auto at = values.find(name);
-  if (at == values.end() || std::isnan(at->second)) {
-    refuse(fmt::format("{} is {} on this axis; set it from the motor's sheet first, then identify.", name,
-                       at == values.end() ? "not known" : "unset"));
-  }
-  return double{at->second};
-}
-
 /// What would take the motor for cooler than the board does.
 void leave_out_cooler(Offer& offer, const Values& before) {
   constexpr struct {
@@ -84,14 +75,6 @@ std::optional<double> told(const nlohmann::json& lines, const char* name) {
 
 }  // namespace
 
-double continuous_A(const Values& values) {
-  const auto get = [&](const char* name) { return value_of(values, name); };
-  const double rise_K = get("winding_max_degC") - get("ambient_degC");
-  const double warm = 1 + get("copper_coefficient_per_K") * (get("winding_max_degC") - 25);
-  // All of the heat passes both resistances: 3/2 R i^2 (R1 + R2) = rise.
-  return std::sqrt(rise_K / (1.5 * get("phase_resistance_ohm") * warm * (get("R1_K_per_W") + get("R2_K_per_W"))));
-}
-
 double course_A(const Values& values) {
   return std::min(continuous_A(values), value_of(values, "current_limit_A") / larger_share);
 }
@@ -130,23 +113,6 @@ std::vector<Piece> designed_course(double course_A, double minutes) {
     left_s -= seconds;
   }
   return course;
-}
-
-std::string sheet_of(const Values& values, const std::string& name) {
-  const auto get = [&](const char* key) { return value_of(values, key); };
-  const double pole_pairs = get("pole_pairs");
-  return fmt::format(
-      "name = \"{}\"\nsource = \"the parameters in force on the board\"\n"
-      "terminal_resistance_ohm = {:.9g}\nterminal_inductance_mH = {:.9g}\ntorque_constant_mNm_per_A = {:.9g}\n"
-      "pole_pairs = {}\nrotor_inertia_gcm2 = 1.0  # not a board's parameter, and nothing of heat depends on it\n"
-      "rated_current_A = {:.9g}\nR1_K_per_W = {:.9g}\nR2_K_per_W = {:.9g}\ntau_winding_s = {:.9g}\ntau_motor_s = "
-      "{:.9g}\n"
-      "winding_max_degC = {:.9g}\ncopper_coefficient_per_K = {:.9g}\n",
-      name, 2 * get("phase_resistance_ohm"), 2e3 * get("inductance_d_H"),
-      1e3 * std::sqrt(3.0) * pole_pairs * get("flux_linkage_Wb"), pole_pairs,
-      continuous_A(values) * wire::direct_per_amplitude, get("R1_K_per_W"), get("R2_K_per_W"),
-      get("R1_K_per_W") * get("C1_J_per_K"), get("R2_K_per_W") * get("C2_J_per_K"), get("winding_max_degC"),
-      get("copper_coefficient_per_K"));
 }
 
 namespace {

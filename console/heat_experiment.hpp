@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What the console does itself about thermal identification: the course of current that is run, the sheet that identify
-// starts from, and what of the model that it found fits into a board's parameters. Pure: no board, no program.
+// What the console does itself about thermal identification: the course of current that is run, and what of the model
+// that was found fits into a board's parameters. Pure: no board, no program.
 #pragma once
 
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "console/motor_sheet.hpp"
 #include "console/profile.hpp"
 
 namespace console {
-
-/// Values of one axis by name without axis: "R1_K_per_W".
-using Values = std::map<std::string, float>;
-
-/// The steady amplitude that would bring the winding to its limit in the end, from the board's own parameters.
-/// Throws UserError (usage) naming the first one that is unset.
-double continuous_A(const Values& values);
 
 /// What the shares of both courses are of: the continuous current, or as much less as lets the larger current flow.
 double course_A(const Values& values);
@@ -32,9 +25,6 @@ std::vector<Piece> cold_course(const Values& values);
 /// after each burst and in rests the winding is read. Amperes are shares of course_A up to 2.5 times; the
 /// governor may cut bursts, which the log then shows.
 std::vector<Piece> designed_course(double course_A, double minutes);
-
-/// A motor sheet (TOML) that says what the board believes: identify's gauge is then the board's resistance.
-std::string sheet_of(const Values& values, const std::string& name);
 
 /// Parameters that the model file of identify (--write-model) comes to on this board, of which `before` is known; empty
 /// if the model has something that they cannot express, and `why` says what.

@@ -13,7 +13,7 @@
 #include "console/commands.hpp"
 #include "console/drive.hpp"
 #include "console/heat_experiment.hpp"
-#include "console/parameter_file.hpp"
+#include "console/proposal.hpp"
 #include "console/recorder.hpp"
 #include "console/winding_log.hpp"
 #include "wire/pc/files.hpp"
@@ -54,21 +54,6 @@ void run_identify(std::vector<std::string> arguments, const std::string& json, b
   if (code != 0 && !std::filesystem::exists(json))
     refuse_data("identify could not use the log; its sentence stands above, the log is kept.");
 }
-
-Values values_of(Session& session, int axis) {
-  std::vector<Target> mine;
-  for (const Target& target : session.parameters().all()) {
-    if (target.axis == axis) mine.push_back(target);
-  }
-  const std::vector<float> numbers = session.get(mine);
-  Values values;
-  for (std::size_t i = 0; i < mine.size(); ++i) values[full_name(*mine[i].what)] = numbers[i];
-  return values;
-}
-
-struct Consent {
-  bool yes = false, save = false;
-};
 
 struct Arguments {
   std::string axis = "0", out = "out/identify";
@@ -135,51 +120,6 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
   return driven;
 }
 
-bool agreed(Console& console, const Consent& consent) {
-  if (consent.yes) return true;
-  if (console.options.json || isatty(STDIN_FILENO) == 0) return false;
-  fmt::print("Put these in force? [y/N] ");
-  std::fflush(stdout);
-  std::string answer;
-  std::getline(std::cin, answer);
-  std::cin.clear();  // Ctrl-C ended it, and the prompt may ask again
-  stop_if_interrupted("Stopped; nothing was written.");
-  return answer == "y" || answer == "yes";
-}
-
-struct Outcome {
-  std::string text;
-  Json json;
-};
-
-/// Shows what would change, and after a yes writes it.
-Outcome put_in_force(Console& console, int axis, const Values& before, const Values& found, const Consent& consent) {
-  Session& session = console.session();
-  std::string text;
-  Json changes = Json::object();
-  std::vector<Assignment> assignments;
-  for (const auto& [name, value] : found) {
-    const auto old = before.find(name);
-    if (old == before.end() || old->second == value) continue;
-    const Target target = session.parameters().named(fmt::format("axis{}.{}", axis, name)).front();
-    assignments.push_back({target, value});
-    text += fmt::format("  {:<32} {:>11} -> {}\n", full_name(target), shown(old->second), shown(value));
-    changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
-  }
-  for (const Assignment& assignment : assignments) check(assignment, "identify found ");
-  if (!console.options.json) fmt::print("{}", text);
-  const bool written = !assignments.empty() && agreed(console, consent);
-  if (written) {
-    session.set(assignments);
-    if (consent.save) session.save();
-  }
-  const char* said = written && consent.save ? "In force and saved.\n"
-                     : written               ? "In force until the next reset; 'hotcore save' keeps it.\n"
-                     : assignments.empty()   ? "Nothing to write: the board has these values already.\n"
-                                             : "Nothing was written; --yes writes without asking.\n";
-  return {said, {{"changes", changes}, {"written", written}, {"saved", written && consent.save}}};
-}
-
 void identify(Console& console, const Arguments& a) {
   const std::string log = a.out + "/log.csv", sheet = a.out + "/motor.toml", json = a.out + "/answer.json",
                     model = a.out + "/model.toml";
@@ -218,50 +158,16 @@ void identify(Console& console, const Arguments& a) {
                  {"note", offered.note}};
   const std::string text = fmt::format("{}\nLog, model and report: {}\n", sentence, a.out);
   if (offered.values.empty()) {
-    result.update(put_in_force(console, axis, before, {}, a.consent).json);
+    result.update({{"changes", Json::object()}, {"written", false}, {"saved", false}});
     return console.say(fmt::format("{}Nothing was written: {}.\n", text, offered.note), result);
   }
   if (!console.options.json) fmt::print("{}{}.\n", text, offered.note);
-  const Outcome outcome = put_in_force(console, axis, before, offered.values, a.consent);
+  const Outcome outcome = put_in_force(console, axis, before, offered.values, "identify found ", a.consent);
   result.update(outcome.json);
   console.say(outcome.text, result);
 }
 
-struct ModelArguments {
-  std::string axis = "0", file;
-  Consent consent;
-};
-
-/// The board takes what identify found elsewhere, from a log of any origin.
-void take_model(Console& console, const ModelArguments& a) {
-  const int axis = a.axis == "1" ? 1 : 0;
-  const Values before = values_of(console.session(), axis);
-  std::string why;
-  const Values found = parameters_of_model(a.file, before, why);
-  if (found.empty())
-    refuse_data(
-        fmt::format("{}: it has {}, which this board's parameters cannot express; run it with host-sim "
-                    "(--set model=FILE).",
-                    a.file, why));
-  const Outcome outcome = put_in_force(console, axis, before, found, a.consent);
-  console.say(outcome.text, outcome.json);
-}
-
-void add_consent(CLI::App& command, Consent& consent) {
-  command.add_flag("--yes", consent.yes, "write what was found without asking");
-  command.add_flag("--save", consent.save, "and keep it over a reset");
-}
-
 }  // namespace
-
-void add_model(CLI::App& app, Console& console) {
-  auto a = std::make_shared<ModelArguments>();
-  CLI::App* command = app.add_subcommand("model", "put a model of 'identify --write-model' in force");
-  command->add_option("FILE", a->file, "the model")->required();
-  command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
-  add_consent(*command, a->consent);
-  command->callback([&console, a] { take_model(console, *a); });
-}
 
 void add_identify(CLI::App& app, Console& console) {
   auto a = std::make_shared<Arguments>();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "firmware/axis_parameters.hpp"
 
+#include "wire/bus_window.hpp"
+
 namespace firmware {
 
 namespace {
@@ -44,15 +46,11 @@ AxisParameters parameters_from(const wire::Motor& motor, const BoardRating& rati
   p.pole_pairs_count = static_cast<float>(motor.pole_pairs);
   p.angle_offset_rad = installation.angle_offset_rad;
   p.current_limit_A = rating.peak_A;
-  // Two axes that brake with all they have raise a bus of 1 mF by 25 V a millisecond, and a current takes a quarter of
-  // one to follow: 3.3 V above the end at 1700 rad/s and 48 V (closed_loop_test). Lower supplies leave more.
-  p.bus_high_start_V = 1.06f * installation.supply_V;
-  p.bus_high_end_V = 1.13f * installation.supply_V;
-  p.bus_low_start_V = 0.75f * installation.supply_V;
-  p.bus_low_end_V = 0.5f * installation.supply_V;
-  // 2 % inside the trip, so that derating is complete before the bridge opens.
-  if (p.bus_high_end_V > 0.98f * rating.bus_max_V) p.bus_high_end_V = 0.98f * rating.bus_max_V;
-  if (p.bus_low_end_V < 1.02f * rating.bus_min_V) p.bus_low_end_V = 1.02f * rating.bus_min_V;
+  const wire::BusWindow bus = wire::bus_window(installation.supply_V, rating.bus_min_V, rating.bus_max_V);
+  p.bus_high_start_V = bus.high_start_V;
+  p.bus_high_end_V = bus.high_end_V;
+  p.bus_low_start_V = bus.low_start_V;
+  p.bus_low_end_V = bus.low_end_V;
   return p;
 }
 

@@ -55,8 +55,7 @@ struct Installation {
   float angle_offset_rad;  // electrical, see axis.params
 };
 
-/// A complete set from a motor's sheet. Bus derating follows the supply: braking from 106 % to 113 %, driving from 75 %
-/// down to 50 % of it (design values of ours), kept inside the board's own trips.
+/// A complete set from a motor's sheet; bus derating follows the supply (wire/bus_window.hpp).
 [[nodiscard]] AxisParameters parameters_from(const wire::Motor& motor, const BoardRating& rating,
                                              const Installation& installation);
 

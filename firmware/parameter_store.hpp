@@ -55,6 +55,8 @@ class ParameterStore {
     staged_.seal();
   }
 
+  const BoardRating& rating() const { return rating_; }
+
   /// Once, before the watchdogs run (it may erase): puts the saved set in force. What the answer refuses must not be
   /// driven: hand its finding to Driver::hold.
   template <hal::Store S>

@@ -24,7 +24,7 @@ namespace wire {
 static_assert(std::endian::native == std::endian::little, "messages are memory images");
 
 /// Rises when a PC that knows only the older one would misread the board, or the other way round.
-inline constexpr std::uint16_t protocol_version = 3;  // 2: control modes; 3: time left
+inline constexpr std::uint16_t protocol_version = 4;  // 2: control modes; 3: time left; 4: bus trips
 
 /// pid.codes' test id: a placeholder, to be replaced before anything is sold. https://pid.codes/1209/0001/
 inline constexpr std::uint16_t usb_vendor_id = 0x1209, usb_product_id = 0x0001;
@@ -172,6 +172,7 @@ struct Hello {
   std::uint8_t zero[3]{};
   float pwm_Hz;
   std::uint32_t capture_words;  // a row takes one a signal and one more
+  float bus_min_V, bus_max_V;   // outside, the bridges open
   char board[16];
   char firmware[16];  // version
   char serial[28];    // as in the USB string descriptor
@@ -299,16 +300,17 @@ HOTCORE_AT(CaptureOrder, pre, 8);
 HOTCORE_AT(CaptureOrder, decimation, 12);
 HOTCORE_SIZE(Answer, 4);
 HOTCORE_AT(Answer, id, 2);
-HOTCORE_SIZE(Hello, 88);
+HOTCORE_SIZE(Hello, 96);
 HOTCORE_AT(Hello, protocol, 4);
 HOTCORE_AT(Hello, dictionary_hash, 8);
 HOTCORE_AT(Hello, parameters, 12);
 HOTCORE_AT(Hello, axes, 16);
 HOTCORE_AT(Hello, pwm_Hz, 20);
 HOTCORE_AT(Hello, capture_words, 24);
-HOTCORE_AT(Hello, board, 28);
-HOTCORE_AT(Hello, firmware, 44);
-HOTCORE_AT(Hello, serial, 60);
+HOTCORE_AT(Hello, bus_min_V, 28);
+HOTCORE_AT(Hello, board, 36);
+HOTCORE_AT(Hello, firmware, 52);
+HOTCORE_AT(Hello, serial, 68);
 HOTCORE_SIZE(ParameterText, 20);
 HOTCORE_AT(ParameterText, axes, 6);
 HOTCORE_AT(ParameterText, min, 8);

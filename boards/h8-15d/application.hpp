@@ -61,7 +61,7 @@ class Application {
   firmware::Recorder recorder_;
   char serial_[25]{};  // the chip's unique id: 24 digits
   firmware::usb::Identity identity_{"h8-15d", firmware::version, serial_};
-  firmware::Link link_{driver_, recorder_, parameters_, identity_, rating};
+  firmware::Link link_{driver_, recorder_, parameters_, identity_};
   firmware::TextPort text_{link_};
   UsbController usb_port_;
   firmware::usb::Device<UsbController, firmware::Link, firmware::TextPort> usb_{usb_port_, identity_, link_, text_};

@@ -80,7 +80,8 @@ std::optional<wire::Hello> hello_in(const wire::Frame& frame) {
   // Of another version, whatever else it says means something else, and it may be shorter.
   if (hello.protocol != wire::protocol_version) return hello;
   const bool sane = frame.bytes >= sizeof hello && hello.axes >= 1 && hello.axes <= wire::axis_count &&
-                    hello.pwm_Hz >= 1000.0f && hello.pwm_Hz <= 1e6f && hello.max_payload <= wire::max_payload;
+                    hello.pwm_Hz >= 1000.0f && hello.pwm_Hz <= 1e6f && hello.max_payload <= wire::max_payload &&
+                    hello.bus_min_V >= 0.0f && hello.bus_max_V > hello.bus_min_V;
   return sane ? std::optional(hello) : std::nullopt;
 }
 

@@ -165,8 +165,10 @@ void Commands::hello(Reply& reply) {
   hello.parameters = parameter_count;
   hello.signals = axis_signal_count;
   hello.axes = axis_count;
-  hello.pwm_Hz = pwm_Hz_;
+  hello.pwm_Hz = parameters_.rating().pwm_Hz;
   hello.capture_words = Recorder::capture_words;
+  hello.bus_min_V = parameters_.rating().bus_min_V;
+  hello.bus_max_V = parameters_.rating().bus_max_V;
   copy_text(hello.board, identity_.board);
   copy_text(hello.firmware, identity_.firmware);
   copy_text(hello.serial, identity_.serial);

@@ -43,9 +43,8 @@ class Reply {
 
 class Commands {
  public:
-  Commands(Driver& driver, Recorder& recorder, ParameterStore& parameters, const usb::Identity& identity,
-           const BoardRating& rating)
-      : driver_(driver), recorder_(recorder), parameters_(parameters), identity_(identity), pwm_Hz_(rating.pwm_Hz) {}
+  Commands(Driver& driver, Recorder& recorder, ParameterStore& parameters, const usb::Identity& identity)
+      : driver_(driver), recorder_(recorder), parameters_(parameters), identity_(identity) {}
 
   /// True if the kind is known and the payload has a length it can have; else the reply says what is wrong.
   static bool well_formed(const wire::Frame& request, Reply& reply);
@@ -84,7 +83,6 @@ class Commands {
   Recorder& recorder_;
   ParameterStore& parameters_;
   const usb::Identity& identity_;
-  float pwm_Hz_;
 };
 
 }  // namespace firmware

@@ -19,9 +19,8 @@ namespace firmware {
 
 class Link {
  public:
-  Link(Driver& driver, Recorder& recorder, ParameterStore& parameters, const usb::Identity& identity,
-       const BoardRating& rating)
-      : commands_(driver, recorder, parameters, identity, rating) {}
+  Link(Driver& driver, Recorder& recorder, ParameterStore& parameters, const usb::Identity& identity)
+      : commands_(driver, recorder, parameters, identity) {}
 
   // usb::Stream, USB context.
   void restart();

@@ -626,6 +626,17 @@ TEST_F(Commands, AnAnswerThatIsCutShortIsNotBelieved) {
   }
 }
 
+TEST_F(Commands, ASheetAsksForTheEncodersAngleAndForABoardThatKnowsAllOfIt) {
+  const std::string sheet = "motor " HOTCORE_SOURCE_DIR "/boards/motors/ec-16-40w.toml --yes --supply 48";
+  refused(sheet, 2, "This board's firmware knows no C1_J_per_K");
+  board_->parameters.push_back({0x0106, "angle_offset", "rad", "", -4.0f, 4.0f, std::nanf("")});
+  for (const std::uint8_t axis : {0, 1}) board_->in_force[{0x0106, axis}] = std::nanf("");
+  console_.hang_up();
+  refused(sheet, 2, "axis0.angle_offset_rad is unset: say what the encoder reads");
+  refused(sheet + " --angle-offset 1", 2, "knows no C1_J_per_K");
+  refused("motor nowhere.toml --supply 48", 2, "nowhere.toml");
+}
+
 TEST_F(Commands, FilesThatAreWrongAreNamed) {
   const auto write = [&](const std::string& text) { std::ofstream(path("p.toml")) << text; };
   refused("restore " + path("nowhere.toml"), 2, "nowhere.toml: there is no such file");

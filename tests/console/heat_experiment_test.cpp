@@ -108,6 +108,22 @@ TEST(HeatExperiment, TheSheetSaysWhatTheBoardBelieves) {
   EXPECT_NEAR(motor.R2_K_per_W, 16.3, 1e-5);
 }
 
+TEST(HeatExperiment, ASheetOfABoardThatWasToldASheetSaysTheSame) {
+  for (const std::string& name : wire::pc::motor_names(HOTCORE_SOURCE_DIR "/boards/motors")) {
+    const auto told = wire::pc::read_motor(name, HOTCORE_SOURCE_DIR "/boards/motors").motor;
+    console::Values board = console::parameters_of_sheet(told, wire::bus_window(48, 12, 58), {{"ambient_degC", 40.0f}});
+    EXPECT_FALSE(board.contains("ambient_degC")) << "that is the room's";
+    board["ambient_degC"] = 40.0f;
+    const auto again = wire::pc::read_motor(file("again.toml", console::sheet_of(board, name)), "").motor;
+    const auto same = [&](double wire::Motor::*value) { EXPECT_NEAR(again.*value, told.*value, 1e-6 * told.*value); };
+    EXPECT_EQ(again.pole_pairs, told.pole_pairs);
+    for (const auto value : {&wire::Motor::phase_resistance_ohm, &wire::Motor::inductance_d_H,
+                             &wire::Motor::flux_linkage_Wb, &wire::Motor::R1_K_per_W, &wire::Motor::R2_K_per_W,
+                             &wire::Motor::C1_J_per_K, &wire::Motor::C2_J_per_K, &wire::Motor::winding_max_degC})
+      same(value);
+  }
+}
+
 const std::string two_resistors =
     "format = 1\n[[node]]\ncapacity_J_per_K = 0.5\n[[node]]\ncapacity_J_per_K = 20\n"
     "[[link]]\nfrom = 0\nto = 1\nlaw = \"constant\"\nconductance_W_per_K = 0.5\n"

@@ -77,6 +77,20 @@ file(WRITE ${SCRATCH}/numbers.toml "format = 1\nnode = [1, 2]\nlink = []\nsource
 expect(model_of_numbers 2 "^numbers.toml: there is no ..node..; let identify" ${sim} model numbers.toml)
 expect(model_that_is_not_there 2 "^nowhere.toml: there is no such file" ${sim} model nowhere.toml)
 
+# A motor's sheet: what the board of this motor holds, and nothing of what was found of the one before.
+expect(sheet_that_is_in_force 0 "EC 16.*recalled.*Nothing to write: the board has these values already" ${sim} motor ec-16-40w --supply 48)
+set(typed "model found.toml --axis 1 --yes\nmotor ec-powermax-30-48v --supply 24 --axis 1 --yes\nget axis1.phase_resistance_ohm\nmotor ec-powermax-30-48v --supply 24 --axis 1 --save\nquit\n")
+expect(sheet_of_another_motor 0 "axis1.bus_low_end_V +24 -> 12.24.*axis1.third_mass_J_per_K +80 -> 0.*axis1.trust_power_share +0.03 -> 0.2.*In force until.*axis1.phase_resistance_ohm +0.193.*The board had these values already. saved" ${sim})
+set(typed "")
+expect(sheet_without_a_yes 0 "Nothing was written; --yes" ${sim} motor ${motors}/ec-powermax-30-24v.toml --supply 24)
+expect(angle_of_the_encoder 0 "axis0.angle_offset_rad +0 -> 1.5" ${sim} motor ec-16-40w --supply 48 --angle-offset 1.5)
+foreach(volts 13 55)
+  expect(supply_too_near_to_a_trip_${volts} 2 "^--supply ${volts}: this board opens its bridges below 12 and above 58 V" ${sim} motor ec-16-40w --supply ${volts})
+endforeach()
+expect(sheet_without_a_supply 2 "--supply is required" ${sim} motor ec-16-40w)
+expect(sheet_that_is_not_there 2 "did you mean 'ec-16-40w'" ${sim} motor ec-16-40 --supply 48)
+expect(model_for_a_motor 2 "heat model" ${sim} motor found.toml --supply 48)
+
 # An identify beside hotcore that ends as by Ctrl-C, which reaches both, and one that is killed.
 file(COPY ${HOTCORE} DESTINATION ${SCRATCH}/beside)
 foreach(ended "130;Stopped while identify worked; nothing was written, the log is kept;kill -INT \$PPID $$" "3;identify was killed by signal 9; the log is kept, run it by hand;kill -9 $$")

@@ -199,7 +199,7 @@ TEST(Fuzz, NoCommandBreaksTheDecoder) {
   board.advance(3000);
   const firmware::usb::Identity identity{"fuzz", "0", "1"};
   auto recorder = std::make_unique<firmware::Recorder>();
-  firmware::Commands commands(board.driver(), *recorder, board.parameters(), identity, boards::dual_48V_20A);
+  firmware::Commands commands(board.driver(), *recorder, board.parameters(), identity);
   constexpr std::size_t lengths[] = {0, 1, 2, 4, 8, 12, 16, 18, 20, 24, 40, 60, 132, 480};
   std::uint8_t payload[wire::max_payload];
   long done = 0;

@@ -32,6 +32,8 @@ TEST_F(Linked, HelloSaysWhoItIs) {
   EXPECT_STREQ(hello.serial, "SIM0");
   EXPECT_STREQ(hello.board, "virtual");
   EXPECT_EQ(hello.pwm_Hz, 20e3f);
+  EXPECT_EQ(hello.bus_min_V, boards::dual_48V_20A.bus_min_V);
+  EXPECT_EQ(hello.bus_max_V, boards::dual_48V_20A.bus_max_V);
   EXPECT_NE(hello.dictionary_hash, 0u);
   EXPECT_EQ(hello.parameters, firmware::parameter_count);
 }

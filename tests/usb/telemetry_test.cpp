@@ -89,7 +89,7 @@ TEST_F(Linked, RowsThatAHostDoesNotReadAreDroppedAndCounted) {
 TEST_F(Linked, RowsThatMissPeriodsBeginANewFrame) {
   const firmware::usb::Identity identity{"test", "0", "1"};
   auto recorder = std::make_unique<firmware::Recorder>();
-  firmware::Commands commands(board.driver(), *recorder, board.parameters(), identity, boards::dual_48V_20A);
+  firmware::Commands commands(board.driver(), *recorder, board.parameters(), identity);
   firmware::Reply reply;
   const Bytes order = bytes_of(wire::Subscribe{1}, wire::SignalAddress{id_bus, 0});
   commands.answer(

@@ -24,7 +24,7 @@ firmware::DriverSetup setup_from(const firmware::ParameterSet& set) {
 
 VirtualBoard::Usb::Usb(firmware::Driver& driver, firmware::Recorder& recorder, firmware::ParameterStore& parameters,
                        const firmware::usb::Identity& identity)
-    : link(driver, recorder, parameters, identity, rating),
+    : link(driver, recorder, parameters, identity),
       text(link),
       device(controller, identity, link, text),
       bus(controller, device) {
