@@ -173,5 +173,21 @@ TEST(Interrupts, NestInTheOrderOfTheTableAndReturnInTheOpposite) {
   EXPECT_EQ(pcb->chip.troubles().count(), 0u) << pcb->chip.report_text();
 }
 
+// A conversion that ends while the supply falls: what it would start has nothing left to drive, and last words are due.
+TEST(Interrupts, TheFastLaneEndsWithTheSupply) {
+  NEEDS_IMAGE(image);
+  auto pcb = board();
+  ASSERT_TRUE(pcb->arm());
+  hold(*pcb, 4.0f, 4.0f, 0.02);
+  pcb->chip.set_supply(2.8);
+  ASSERT_TRUE(run_into(*pcb, pvd));
+  pcb->chip.core().clear_counts();
+  pcb->chip.nvic.pend(adc);
+  for (int k = 0; k < 140 && pcb->chip.nvic.running() == pvd; ++k) pcb->run_for(10e-6);  // the window watchdog: 1.56 ms
+  ASSERT_NE(pcb->chip.nvic.running(), pvd) << "the last words last longer";
+  pcb->run_for(10e-6);
+  EXPECT_EQ(pcb->chip.core().lane(adc).calls, 0u);
+}
+
 }  // namespace
 }  // namespace image_tests
