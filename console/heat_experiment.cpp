@@ -8,7 +8,6 @@
 #include <iterator>
 #include <optional>
 
-#include "wire/motor.hpp"
 #include "wire/pc/toml_file.hpp"
 #include "wire/pc/user_error.hpp"
 
