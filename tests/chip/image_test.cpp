@@ -295,13 +295,32 @@ TEST(Image, ARotorOnAnIndexThatTheHallSensorsContradictIsNotArmed) {
   EXPECT_FALSE(standing_between_two_switches(0.0, setup)->arm(0.3));
 }
 
-TEST(Image, RefusesToArmWithoutParameters) {
+// The first use of a board: empty flash, one axis told after the other.
+TEST(Image, ABoardArmsOnceItWasToldItsMotorsAndNotBefore) {
   NEEDS_IMAGE(image);
   Options o;
   o.parameters = false;
   auto pcb = board(o);
   EXPECT_FALSE(pcb->arm(0.3));
   EXPECT_TRUE(pcb->gates_open(0) && pcb->gates_open(1));
+  firmware::AxisSet told[2];
+  setup_of(o, told);
+  for (const auto axis : {std::uint8_t{0}, std::uint8_t{1}}) {
+    EXPECT_FALSE(pcb->arm(0.3)) << "axis " << +axis << " and what follows were not told";
+    for (int i = 0; i < 2; ++i) {
+      pcb->wish(i, h8_15d::wish_disarm);
+      pcb->run_for(0.01);
+    }
+    for (int k = 0; k < firmware::parameter_count; ++k) {
+      const wire::Address where{firmware::parameter_info(k)->id, axis};
+      ASSERT_EQ(pcb->order(h8_15d::order_stage, {where, firmware::parameter_value(told[axis], k)}).status, 0);
+    }
+    ASSERT_EQ(pcb->order(h8_15d::order_commit).status, 0);
+  }
+  ASSERT_EQ(pcb->order(h8_15d::order_save).status, 0);
+  EXPECT_TRUE(pcb->arm()) << "without a restart";
+  pcb->power_on(2);
+  EXPECT_TRUE(pcb->arm()) << "and after one";
   NO_TROUBLE(*pcb);
 }
 
