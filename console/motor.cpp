@@ -14,7 +14,7 @@
 namespace console {
 namespace {
 
-struct Arguments {
+struct MotorArguments {
   std::string axis = "0", file;
   double supply_V = 0;
   std::optional<double> angle_offset_rad;
@@ -22,7 +22,7 @@ struct Arguments {
 };
 
 /// Another motor hangs on the axis: its sheet, and nothing of what was found of the one before.
-void take_sheet(Console& console, const Arguments& a) {
+void take_sheet(Console& console, const MotorArguments& a) {
   const wire::pc::MotorFile motor = wire::pc::read_motor(a.file, console.options.motor_folder);
   Session& session = console.session();
   const int axis = a.axis == "1" ? 1 : 0;
@@ -57,7 +57,7 @@ void take_sheet(Console& console, const Arguments& a) {
 }
 
 /// The board takes what identify found elsewhere, from a log of any origin.
-void take_model(Console& console, const Arguments& a) {
+void take_model(Console& console, const MotorArguments& a) {
   const int axis = a.axis == "1" ? 1 : 0;
   const Values before = values_of(console.session(), axis);
   std::string why;
@@ -75,8 +75,8 @@ void take_model(Console& console, const Arguments& a) {
 
 void add_motor(CLI::App& app, Console& console) {
   const auto command = [&](const char* name, const char* does, const char* file,
-                           void (*take)(Console&, const Arguments&)) {
-    auto a = std::make_shared<Arguments>();
+                           void (*take)(Console&, const MotorArguments&)) {
+    auto a = std::make_shared<MotorArguments>();
     CLI::App* made = app.add_subcommand(name, does);
     made->add_option("FILE", a->file, file)->required();
     made->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
