@@ -13,7 +13,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 /// The drives of a future step: speeds and powers go on as they are, everything that follows current is replaced.
 HeatInput<> future_input(const CoreEstimator& core, float current_A, const PhaseShares& shares) {
   HeatInput<> input = core.input();
-  const double i_A = static_cast<double>(current_A), i_A2 = i_A * i_A;
+  const double i_A = std::abs(static_cast<double>(current_A)), i_A2 = i_A * i_A;  // what goes the other way heats too
   for (int k = 0; k < 3; ++k) {
     input[phase_drive(k)] = i_A2 * static_cast<double>(shares.k[k]);
   }
