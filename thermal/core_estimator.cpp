@@ -356,7 +356,7 @@ HeatMemory CoreEstimator::save() const {
 }
 
 void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
-  if (memory.node_count != n_) return start_hot();
+  if (memory.node_count != n_) return start_as_hot_as(memory);
   const double believed = static_cast<double>(settings_.ambient_degC);
   const double saved_ambient = static_cast<double>(memory.ambient_degC);
   ambient_degC_ = plausible(saved_ambient) && saved_ambient > believed ? saved_ambient : believed;
@@ -388,6 +388,28 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   if (memory.disbelieved != 0) {
     watch_.disbelieve();
     know_housing(sigma_K[housing_.node]);
+  }
+  publish();
+}
+
+/// Another model's nodes are not these: all are as hot as its hottest. Sensor and surroundings are the same. A single
+/// node is no motor's.
+void CoreEstimator::start_as_hot_as(const HeatMemory& memory) {
+  start_hot();
+  if (memory.node_count < 2) return;
+  double hottest_degC = degC_[housing_.node];
+  for (int i = 0; i < memory.node_count && i < max_nodes; ++i) {
+    const double saved = static_cast<double>(memory.degC[i]);
+    if (plausible(saved) && saved > hottest_degC) hottest_degC = saved;
+  }
+  degC_.setConstant(hottest_degC);
+  good_degC_ = degC_;
+  const double saved_ambient = static_cast<double>(memory.ambient_degC);
+  if (plausible(saved_ambient) && saved_ambient > ambient_degC_) good_ambient_degC_ = ambient_degC_ = saved_ambient;
+  settle_sensor();
+  if (memory.disbelieved != 0) {
+    watch_.disbelieve();
+    know_housing(start_sigma_K);
   }
   publish();
 }
@@ -449,11 +471,9 @@ void CoreEstimator::start_hot() {
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
 double CoreEstimator::lowest_limit_degC() const {
-  float lowest = 155.0f;
-  for (int i = 0; i < n_; ++i) {
-    if (max_degC_[i] < lowest) lowest = max_degC_[i];
-  }
-  return static_cast<double>(lowest);
+  double lowest = hottest_possible_degC;
+  for (int i = 0; i < n_; ++i) lowest = std::fmin(lowest, static_cast<double>(max_degC_[i]));
+  return lowest < hottest_possible_degC ? lowest : 155.0;
 }
 
 /// Nothing but temperatures and their sigmas has survived.

@@ -715,6 +715,18 @@ TEST(Estimator, AResetTakesNothingOfWhatIsYetToBeGivenBack) {
   }
 }
 
+TEST(Estimator, WhatNothingIsKnownOfIsTenKelvinBelowItsLimitHoweverHighThatIs) {
+  for (const double limit_degC : {80.0, 155.0, 200.0, 250.0}) {
+    wire::Motor m = reference::ec16();
+    m.winding_max_degC = limit_degC;
+    CoreEstimator started(thermal::three_phase_set(m), {}), late(thermal::three_phase_set(m), {});
+    started.start_hot();
+    late.tick({}, missing, {25.0f, true}, 201);
+    EXPECT_NEAR(started.estimate().hottest_degC(), limit_degC - 10, 1e-6);
+    EXPECT_NEAR(late.estimate().hottest_degC(), limit_degC - 10, 2.0);
+  }
+}
+
 TEST(Estimator, AStartWithoutMemoryIsNoColderThanItsSurroundings) {
   wire::Motor cool = reference::ec16();
   cool.winding_max_degC = 45;
@@ -777,6 +789,36 @@ TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAResetForBeingLessWrong)
     ASSERT_TRUE(again.estimate().flags & thermal::housing_contradicts);
   }
   EXPECT_GE(again.estimate().housing_degC, before_degC);
+}
+
+/// A third mass more or less, with a reset or without one.
+TEST(Estimator, AnotherNumberOfNodesIsNoColderAndMakesNoSensorTrue) {
+  auto with_mass = thermal::three_phase_set(reference::ec16());
+  with_mass.nodes[with_mass.node_count] = {30.0, std::numeric_limits<float>::infinity()};
+  with_mass.links[with_mass.link_count++] =
+      thermal::motor_set::link(with_mass.housing.node, with_mass.node_count++, 0.5);
+  for (const bool reset : {false, true}) {
+    SCOPED_TRACE(reset);
+    Bench b(reference::ec16(), with(thermal::identified_trust), 25);
+    b.run(60, 1);
+    const Reading stuck = b.honest();
+    b.run(600, 8, [&] { return stuck; });
+    ASSERT_TRUE(b.flag(thermal::housing_contradicts));
+    b.core.raise_to(160);
+    const double ambient_degC = b.core.estimate().ambient_degC;
+    const thermal::HeatMemory memory = b.core.save();
+    if (reset) {
+      b.core = CoreEstimator(with_mass, with(thermal::identified_trust));
+      b.core.restore(memory, -1);
+    } else {
+      b.core.replace(with_mass, with(thermal::identified_trust));
+    }
+    EXPECT_GE(b.core.estimate().hottest_degC(), 160 - 1e-3);
+    EXPECT_GE(b.core.estimate().ambient_degC, ambient_degC - 1e-3);
+    b.run(120, 8, [&] { return stuck; });
+    EXPECT_TRUE(b.flag(thermal::housing_contradicts));
+    EXPECT_GT(b.core_error_K(), -5);
+  }
 }
 
 /// A model that is written while a motor works, again and again, makes a sensor that stands still no better than it is.
