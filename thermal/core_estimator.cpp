@@ -89,7 +89,8 @@ const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, R
   return estimate_;
 }
 
-/// Takes over what is usable; what is not becomes the last value times 1.1, a current the full scale. False if any was.
+/// Takes over what is usable; what is not becomes the last value times 1.1, a current the full scale, what cools
+/// nothing. False if any was.
 bool CoreEstimator::take_input(const HeatInput<>& input) {
   bool good = true;
   for (int i = 0; i < drive_count; ++i) {
@@ -99,6 +100,10 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
       continue;
     }
     good = false;
+    if (static_cast<Drive>(i) == Drive::speed_to_0_8) {  // it only cools
+      input_.drive[i] = 0.0;
+      continue;
+    }
     input_.drive[i] *= 1.1;
     const bool square = is_current_square(static_cast<Drive>(i));
     const double full_scale = square ? static_cast<double>(settings_.full_scale_A2) : 1e4;

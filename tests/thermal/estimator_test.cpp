@@ -629,6 +629,21 @@ TEST(Estimator, ASpeedThatIsNotANumberCountsForMoreEachTime) {
   EXPECT_EQ(last, 1e4);
 }
 
+TEST(Estimator, ASpeedThatIsNotANumberCoolsNothing) {
+  auto set = thermal::three_phase_set(reference::ec16());
+  set.links[set.link_count - 1].law = thermal::LinkLaw::speed;
+  set.links[set.link_count - 1].k = 0.05;
+  CoreEstimator blind(set, with(thermal::exact_trust)), standing = blind;
+  HeatInput<> input = current(4);
+  input[Drive::speed_to_0_8] = 100;
+  for (int i = 0; i < 6000; ++i) {
+    blind.tick(input, missing, {25.0f, true});
+    standing.tick(current(4), missing, {25.0f, true});
+    input[Drive::speed_to_0_8] = nan;
+  }
+  EXPECT_NEAR(blind.estimate().housing_degC, standing.estimate().housing_degC, 0.1);
+}
+
 TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
   CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
   for (int i = 0; i < 7; ++i) whole.tick(current(100), missing);
