@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <new>
+#include <utility>
 
 #include "thermal/validate.hpp"
 
@@ -395,6 +396,7 @@ void Axis::look_ahead() {
 
 /// The tick may come in at any place: what it changed under the look is not looked at.
 void Axis::watch() {
+  speeds_.add(rotor_.rad_per_s());
   const std::uint32_t before = heat_.adding().periods;
   std::atomic_signal_fence(std::memory_order_seq_cst);
   const bool whole = mode_turned_ == turned(mode_), armed = mode_ == Mode::ready || mode_ == Mode::running;
@@ -462,11 +464,13 @@ void Axis::add_contradicted(float (&phase_A2)[3]) const {
   }
 }
 
-/// Means over the step; speed and mode are taken as they stand. No sample at all: what went on before, as long as the
-/// bridge is on.
+/// Means over the step; of the speed, of its looks; the mode is taken as it stands. No sample at all: what went on
+/// before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
   const thermal::Unseen looked = take_unseen();
+  if (speeds_.none()) speeds_.add(rotor_.rad_per_s());
+  const thermal::SpeedLooks speeds = std::exchange(speeds_, {});
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
     unseen_ = {};
@@ -480,7 +484,7 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
       }
     }
     input[thermal::Drive::enabled] = mode_ == Mode::running ? 1.0 : 0.0;
-    thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
+    speeds.fill(input);
   }
   input[thermal::Drive::one] = 1.0;
   return input;

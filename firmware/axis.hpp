@@ -277,6 +277,7 @@ class Axis {
   thermal::Endurance endurance_;
   thermal::Unseen looked_{};  // sum over `looks_`, since the last slow tick
   int looks_ = 0;
+  thermal::SpeedLooks speeds_;  // since the last slow tick
   thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
   float owed_steps_ = 0.0f;       // time that is not yet a whole one
