@@ -19,7 +19,8 @@ constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
 // Later no lane comes whose board has a watchdog: the count has flipped, and what it is shared by would seem to cool.
 constexpr int late_steps = 3;
-constexpr float most_owed_steps = 1e6f;  // beyond any lateness, and a whole number
+constexpr int most_endurance_age_steps = 300;  // an answer takes 160 to 180; while an `ask` is worked off there is none
+constexpr float most_owed_steps = 1e6f;        // beyond any lateness, and a whole number
 // Of three sensors: four times their noise, and gains apart by some percent. Half an ampere of offset is more heat by a
 // tenth where a small winding is held at its limit.
 constexpr float contradiction_A = 0.2f, contradiction_share = 0.03f;
@@ -383,6 +384,10 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   if (!whole) doubt({wire::Fault::memory_changed});
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
+  if ((endurance_age_steps_ += steps_) > most_endurance_age_steps) {
+    endurance_.forget();
+    endurance_age_steps_ = 0;
+  }
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();
 }
@@ -391,7 +396,7 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
 void Axis::look_ahead() {
   if (!core_.whole()) return;
   if (!endurance_.whole()) new (&endurance_) thermal::Endurance(core_.network(), peak_A_);
-  endurance_.go_on(core_, 1);
+  if (endurance_.go_on(core_, 1)) endurance_age_steps_ = 0;
 }
 
 /// The tick may come in at any place: what it changed under the look is not looked at.
