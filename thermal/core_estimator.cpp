@@ -378,12 +378,16 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
   degC_ = rise.array() + ambient_degC_;
   bool soaked = true;
-  for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
+  float soaked_sigma_K = start_sigma_K;
+  for (int i = 0; i < n_; ++i) {
+    soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
+    soaked_sigma_K = std::fmax(soaked_sigma_K, sigma_K[i]);
+  }
   begin_anew(sigma_K);
   remembers_ = memory.degC[housing_.node] > settings_.ambient_degC;  // or it was no warmer than its surroundings
   if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K)
     uncertainty_.set_late_K(static_cast<double>(memory.late_K));
-  if (soaked) uncertainty_.soak();
+  if (soaked) uncertainty_.soak(soaked_sigma_K);
   raise_to(static_cast<float>(mean_winding_degC()));
   for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
     const double saved = static_cast<double>(memory.degC[i]);

@@ -716,6 +716,18 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
 }
 
 /// What a sensor that was found out had taken is given back over half a second; a reset meanwhile does not keep it.
+/// Heard by no sensor, a hot housing is known to 20 % of what it is above its surroundings.
+TEST(Estimator, AResetMakesASoakedMotorNoSurer) {
+  Bench b(reference::ec16(), with(thermal::sheet_trust), 25);
+  b.run(3600, 4.5, [] { return missing; });
+  b.run(20, 0, [] { return missing; });
+  ASSERT_GT(b.sigma_K(), 16.0f);
+  ASSERT_LT(b.core.estimate().hottest_degC(), 155);
+  CoreEstimator again(thermal::three_phase_set(b.m), with(thermal::sheet_trust));
+  again.restore(b.core.save(), -1);
+  EXPECT_GE(again.estimate().hottest_margin_degC(), b.core.estimate().hottest_margin_degC() - 0.1f);
+}
+
 TEST(Estimator, AResetTakesNothingOfWhatIsYetToBeGivenBack) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     Bench b(reference::ec16(), with(trust), 40);
