@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <new>
+#include <utility>
 
 #include "thermal/validate.hpp"
 
@@ -18,7 +19,8 @@ constexpr float nothing_degC = 1e30f;  // above any limit
 constexpr float slow_Hz = 100.0f;
 // Later no lane comes whose board has a watchdog: the count has flipped, and what it is shared by would seem to cool.
 constexpr int late_steps = 3;
-constexpr float most_owed_steps = 1e6f;  // beyond any lateness, and a whole number
+constexpr int most_endurance_age_steps = 300;  // an answer takes 160 to 180; while an `ask` is worked off there is none
+constexpr float most_owed_steps = 1e6f;        // beyond any lateness, and a whole number
 // Of three sensors: four times their noise, and gains apart by some percent. Half an ampere of offset is more heat by a
 // tenth where a small winding is held at its limit.
 constexpr float contradiction_A = 0.2f, contradiction_share = 0.03f;
@@ -382,6 +384,10 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
   if (!whole) doubt({wire::Fault::memory_changed});
   // A bridge that holds zero amperes heats a winding all the same, by ripple.
   if (mode_ == Mode::running && !(allowance_.current_A > 0.0f)) post(Command::rest);
+  if ((endurance_age_steps_ += steps_) > most_endurance_age_steps) {
+    endurance_.forget();
+    endurance_age_steps_ = 0;
+  }
   housing_measured_degC_ = sample.housing.valid ? sample.housing.value_degC : std::numeric_limits<float>::quiet_NaN();
   publish();
 }
@@ -390,11 +396,12 @@ void Axis::slow_tick(const hal::AxisSlowSample& sample, const Allowance& board, 
 void Axis::look_ahead() {
   if (!core_.whole()) return;
   if (!endurance_.whole()) new (&endurance_) thermal::Endurance(core_.network(), peak_A_);
-  endurance_.go_on(core_, 1);
+  if (endurance_.go_on(core_, 1)) endurance_age_steps_ = 0;
 }
 
 /// The tick may come in at any place: what it changed under the look is not looked at.
 void Axis::watch() {
+  speeds_.add(rotor_.rad_per_s());
   const std::uint32_t before = heat_.adding().periods;
   std::atomic_signal_fence(std::memory_order_seq_cst);
   const bool whole = mode_turned_ == turned(mode_), armed = mode_ == Mode::ready || mode_ == Mode::running;
@@ -462,11 +469,13 @@ void Axis::add_contradicted(float (&phase_A2)[3]) const {
   }
 }
 
-/// Means over the step; speed and mode are taken as they stand. No sample at all: what went on before, as long as the
-/// bridge is on.
+/// Means over the step; of the speed, of its looks; the mode is taken as it stands. No sample at all: what went on
+/// before, as long as the bridge is on.
 thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
   thermal::HeatInput<> input{};
   const thermal::Unseen looked = take_unseen();
+  if (speeds_.none()) speeds_.add(rotor_.rad_per_s());
+  const thermal::SpeedLooks speeds = std::exchange(speeds_, {});
   if (sums.periods == 0) {
     if (mode_ == Mode::running) return input_;
     unseen_ = {};
@@ -480,7 +489,7 @@ thermal::HeatInput<> Axis::heat_input(const HeatSums& sums) {
       }
     }
     input[thermal::Drive::enabled] = mode_ == Mode::running ? 1.0 : 0.0;
-    thermal::set_speed(input, static_cast<double>(rotor_.rad_per_s()));
+    speeds.fill(input);
   }
   input[thermal::Drive::one] = 1.0;
   return input;

@@ -78,7 +78,7 @@ struct AxisState {
   float heating_A = 0.0f;       // direct, through two terminals: heats as the phases did, ripple included
   float allowance_A = 0.0f;     // amplitude, the smallest of core, board and what blindness leaves
   float time_left_s = 0.0f;     // that what flows may go on until the core's limit; +infinity beyond half a minute
-  float allowance_1s_A = 0.0f;  // amplitude that the core bears for the next second
+  float allowance_1s_A = 0.0f;  // amplitude that the core bears for the next second; both 0 where they would be old
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
   std::uint32_t estimate_flags = 0;       // thermal::EstimateFlag
   FaultRecord fault;
@@ -275,8 +275,10 @@ class Axis {
   thermal::CoreEstimator core_;
   thermal::Governor governor_;
   thermal::Endurance endurance_;
-  thermal::Unseen looked_{};  // sum over `looks_`, since the last slow tick
+  int endurance_age_steps_ = 0;  // since it last answered
+  thermal::Unseen looked_{};     // sum over `looks_`, since the last slow tick
   int looks_ = 0;
+  thermal::SpeedLooks speeds_;  // since the last slow tick
   thermal::Unseen unseen_{};
   thermal::HeatInput<> input_{};  // of the last slow tick: stands in for one without samples
   float owed_steps_ = 0.0f;       // time that is not yet a whole one

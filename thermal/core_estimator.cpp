@@ -89,7 +89,8 @@ const Estimate& CoreEstimator::tick(const HeatInput<>& input, Reading housing, R
   return estimate_;
 }
 
-/// Takes over what is usable; what is not becomes the last value times 1.1, a current the full scale. False if any was.
+/// Takes over what is usable; what is not becomes the last value times 1.1, a current the full scale, what cools
+/// nothing. False if any was.
 bool CoreEstimator::take_input(const HeatInput<>& input) {
   bool good = true;
   for (int i = 0; i < drive_count; ++i) {
@@ -99,6 +100,10 @@ bool CoreEstimator::take_input(const HeatInput<>& input) {
       continue;
     }
     good = false;
+    if (static_cast<Drive>(i) == Drive::speed_to_0_8) {  // it only cools
+      input_.drive[i] = 0.0;
+      continue;
+    }
     input_.drive[i] *= 1.1;
     const bool square = is_current_square(static_cast<Drive>(i));
     const double full_scale = square ? static_cast<double>(settings_.full_scale_A2) : 1e4;
@@ -356,7 +361,7 @@ HeatMemory CoreEstimator::save() const {
 }
 
 void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
-  if (memory.node_count != n_) return start_hot();
+  if (memory.node_count != n_) return start_as_hot_as(memory);
   const double believed = static_cast<double>(settings_.ambient_degC);
   const double saved_ambient = static_cast<double>(memory.ambient_degC);
   ambient_degC_ = plausible(saved_ambient) && saved_ambient > believed ? saved_ambient : believed;
@@ -373,12 +378,16 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   if (off_s > 0.0 && off_s < 1e9) rise = network_.transition(off_s).phi0.lazyProduct(rise).eval();
   degC_ = rise.array() + ambient_degC_;
   bool soaked = true;
-  for (int i = 0; i < n_; ++i) soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
+  float soaked_sigma_K = start_sigma_K;
+  for (int i = 0; i < n_; ++i) {
+    soaked = soaked && memory.degC[i] <= memory.degC[housing_.node] + soaked_within_K;
+    soaked_sigma_K = std::fmax(soaked_sigma_K, sigma_K[i]);
+  }
   begin_anew(sigma_K);
   remembers_ = memory.degC[housing_.node] > settings_.ambient_degC;  // or it was no warmer than its surroundings
   if (memory.late_K >= 0.0f && memory.late_K < most_sigma_K)
     uncertainty_.set_late_K(static_cast<double>(memory.late_K));
-  if (soaked) uncertainty_.soak();
+  if (soaked) uncertainty_.soak(soaked_sigma_K);
   raise_to(static_cast<float>(mean_winding_degC()));
   for (int i = 0; i < n_; ++i) {  // what was only believed is no memory that a reading contradicts
     const double saved = static_cast<double>(memory.degC[i]);
@@ -388,6 +397,28 @@ void CoreEstimator::restore(const HeatMemory& memory, double off_s) {
   if (memory.disbelieved != 0) {
     watch_.disbelieve();
     know_housing(sigma_K[housing_.node]);
+  }
+  publish();
+}
+
+/// Another model's nodes are not these: all are as hot as its hottest. Sensor and surroundings are the same. A single
+/// node is no motor's.
+void CoreEstimator::start_as_hot_as(const HeatMemory& memory) {
+  start_hot();
+  if (memory.node_count < 2) return;
+  double hottest_degC = degC_[housing_.node];
+  for (int i = 0; i < memory.node_count && i < max_nodes; ++i) {
+    const double saved = static_cast<double>(memory.degC[i]);
+    if (plausible(saved) && saved > hottest_degC) hottest_degC = saved;
+  }
+  degC_.setConstant(hottest_degC);
+  good_degC_ = degC_;
+  const double saved_ambient = static_cast<double>(memory.ambient_degC);
+  if (plausible(saved_ambient) && saved_ambient > ambient_degC_) good_ambient_degC_ = ambient_degC_ = saved_ambient;
+  settle_sensor();
+  if (memory.disbelieved != 0) {
+    watch_.disbelieve();
+    know_housing(start_sigma_K);
   }
   publish();
 }
@@ -449,11 +480,9 @@ void CoreEstimator::start_hot() {
 
 /// The lowest limit of the windings; without one, class F's 155 degC.
 double CoreEstimator::lowest_limit_degC() const {
-  float lowest = 155.0f;
-  for (int i = 0; i < n_; ++i) {
-    if (max_degC_[i] < lowest) lowest = max_degC_[i];
-  }
-  return static_cast<double>(lowest);
+  double lowest = hottest_possible_degC;
+  for (int i = 0; i < n_; ++i) lowest = std::fmin(lowest, static_cast<double>(max_degC_[i]));
+  return lowest < hottest_possible_degC ? lowest : 155.0;
 }
 
 /// Nothing but temperatures and their sigmas has survived.

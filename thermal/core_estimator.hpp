@@ -85,8 +85,8 @@ class CoreEstimator {
   HeatMemory save() const;
   /// After a reset. A time off that is negative or NaN is unknown: then nothing has cooled. The ambient is at least the
   /// one believed; each winding is at least as warm as the mean of them, which they may have reached meanwhile, and as
-  /// the first housing reading. What is not a temperature counts as the node's limit; another number of nodes as
-  /// nothing known, see start_hot.
+  /// the first housing reading. What is not a temperature counts as the node's limit; of another number of nodes the
+  /// hottest counts for all, and see start_hot.
   void restore(const HeatMemory& memory, double off_s);
   /// After a reset of which nothing is known: every node 10 K below the winding's limit, and that with the margin on
   /// it; the housing sensor, the model's cooling or a resistance reading prove otherwise. After either of both a cold
@@ -148,6 +148,7 @@ class CoreEstimator {
   void settle(int steps);
 
   void begin_anew(const float (&sigma_K)[max_nodes]);
+  void start_as_hot_as(const HeatMemory& memory);
   void settle_sensor();
   void know_housing(float sigma_K);
   double lowest_limit_degC() const;

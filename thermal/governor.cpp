@@ -97,6 +97,7 @@ NodeBudget node_budget(const CoreEstimator& core, int node, const PhaseShares& s
     unit[phase_drive(k)] = static_cast<double>(shares.k[k]);
   }
   rest[Drive::current_A2] = rest[Drive::current2_speed2] = 0.0;
+  rest[Drive::enabled] = 1.0;  // a bridge at rest is asked what it will do
   unit[Drive::current_A2] = 1.0;
   unit[Drive::current2_speed2] = core.input()[Drive::speed2_rad2_per_s2];
   const double capacity_J_per_K = core.network().capacity_J_per_K(node);

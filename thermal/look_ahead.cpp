@@ -13,7 +13,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 /// The drives of a future step: speeds and powers go on as they are, everything that follows current is replaced.
 HeatInput<> future_input(const CoreEstimator& core, float current_A, const PhaseShares& shares) {
   HeatInput<> input = core.input();
-  const double i_A = static_cast<double>(current_A), i_A2 = i_A * i_A;
+  const double i_A = std::abs(static_cast<double>(current_A)), i_A2 = i_A * i_A;  // what goes the other way heats too
   for (int k = 0; k < 3; ++k) {
     input[phase_drive(k)] = i_A2 * static_cast<double>(shares.k[k]);
   }
@@ -233,23 +233,35 @@ void Endurance::begin(const CoreEstimator& core) {
   walking_ = true;
 }
 
-/// Takes the walk's answer and chooses what to ask next.
-void Endurance::answer() {
+/// Takes the walk's answer and chooses what to ask next; true: the last was.
+bool Endurance::answer() {
   walking_ = false;
   if (piece_.seconds == longest_s) {
     seconds_left_ = walk_.forecast.limits_after_s;
     piece_ = {ahead_s, max_A_};
     good_A_ = 0.0f, bad_A_ = max_A_;
-    return;
+    return false;
   }
   (walk_.forecast.feasible ? good_A_ : bad_A_) = piece_.current_A;
   piece_.current_A = 0.5f * (good_A_ + bad_A_);
-  if (bad_A_ - good_A_ > 0.01f * max_A_) return;
+  if (bad_A_ - good_A_ > 0.01f * max_A_) return false;
   current_A_ = good_A_;
   piece_ = {longest_s, 0.0f};
+  return true;
 }
 
-void Endurance::go_on(const CoreEstimator& core, int steps) {
+void Endurance::forget() {
+  if (!whole()) return;
+  sum_ = {};
+  slices_ = 0;
+  walking_ = false;
+  piece_ = {longest_s, 0.0f};
+  seconds_left_ = current_A_ = 0.0f;
+  left_ = sum();
+}
+
+bool Endurance::go_on(const CoreEstimator& core, int steps) {
+  bool anew = false;
   for (int k = 0; k < 3; ++k) sum_[phase_drive(k)] += core.input()[phase_drive(k)];
   ++slices_;
   for (int step = 0; step < steps; ++step) {
@@ -257,9 +269,10 @@ void Endurance::go_on(const CoreEstimator& core, int steps) {
     const double left_s = static_cast<double>(piece_.seconds) - walk_.time_s;
     const Transition<double>& t = walk_.time_s < coarse_.dt_s ? core.transition() : coarse_;
     if (walk_.forecast.feasible) step_walk(walk_, core, t, future_input(core, piece_.current_A, shares_), left_s);
-    if (left_s <= t.dt_s || !walk_.forecast.feasible) answer();
+    if (left_s <= t.dt_s || !walk_.forecast.feasible) anew = answer() || anew;
   }
   left_ = sum();
+  return anew;
 }
 
 }  // namespace thermal

@@ -105,7 +105,11 @@ class Endurance {
   Endurance(const HeatNetwork<double>& network, float max_A);
 
   /// A slice, often and in equal intervals: the load is the mean square of what flows while an answer is worked out.
-  void go_on(const CoreEstimator& core, int steps);
+  /// True: both answers are new.
+  bool go_on(const CoreEstimator& core, int steps);
+
+  /// Begins anew: until it has looked, nothing may flow. Not once a bit has flipped.
+  void forget();
 
   /// Until a limit is passed, s; +infinity where that is not within longest_s.
   float seconds_left() const { return seconds_left_; }
@@ -118,7 +122,7 @@ class Endurance {
  private:
   std::uint32_t sum() const;
   void begin(const CoreEstimator& core);
-  void answer();
+  bool answer();
 
   Transition<double> coarse_;
   float max_A_;

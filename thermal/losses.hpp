@@ -134,16 +134,39 @@ inline float bus_power_W(float depth, float bus_V, float bus_A, float Ke_Vs, flo
   return power_W < 0.0f ? 0.0f : power_W;  // NaN stays NaN: the estimator replaces it by something hot
 }
 
-/// Fills every drive that holds speed, from the mean of |w| over one step and the currents that the input holds already
-/// (10 ms is short against both).
+/// |w| during one step, rad/s: means of its powers over some looks at it, and the least, which cools for certain.
+class SpeedLooks {
+ public:
+  void add(float rad_per_s) {
+    const float w = std::fabs(rad_per_s);
+    least_ = looks_ == 0 || !(w >= least_) ? w : least_;
+    sum_ += w, sum2_ += w * w, sum3_ += w * w * w;
+    ++looks_;
+  }
+  bool none() const { return looks_ == 0; }
+
+  /// Fills every drive that holds speed, also from the currents that the input holds already (10 ms is short against
+  /// them). One look at least.
+  void fill(HeatInput<>& input) const {
+    const double share = 1.0 / looks_, w = static_cast<double>(sum_) * share, w2 = static_cast<double>(sum2_) * share;
+    input[Drive::speed_rad_per_s] = w;
+    input[Drive::speed2_rad2_per_s2] = w2;
+    input[Drive::speed3_rad3_per_s3] = static_cast<double>(sum3_) * share;
+    input[Drive::current2_speed2] = input[Drive::current_A] * input[Drive::current_A] * w2;  // not of ripple
+    input[Drive::current_speed] = input[Drive::current_A] * w;
+    input[Drive::speed_to_0_8] = std::pow(static_cast<double>(least_), 0.8);
+  }
+
+ private:
+  float sum_ = 0.0f, sum2_ = 0.0f, sum3_ = 0.0f, least_ = 0.0f;
+  int looks_ = 0;
+};
+
+/// The same of a speed that stays as it is.
 inline void set_speed(HeatInput<>& input, double speed_rad_per_s) {
-  const double w = std::abs(speed_rad_per_s);
-  input[Drive::speed_rad_per_s] = w;
-  input[Drive::speed2_rad2_per_s2] = w * w;
-  input[Drive::speed3_rad3_per_s3] = w * w * w;
-  input[Drive::current2_speed2] = input[Drive::current_A] * input[Drive::current_A] * w * w;  // not of ripple
-  input[Drive::current_speed] = input[Drive::current_A] * w;
-  input[Drive::speed_to_0_8] = std::pow(w, 0.8);
+  SpeedLooks one;
+  one.add(static_cast<float>(speed_rad_per_s));
+  one.fill(input);
 }
 
 }  // namespace thermal

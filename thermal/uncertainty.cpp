@@ -49,11 +49,11 @@ void Uncertainty::widen_all() {
   p_(power(), inner()) = p_(inner(), power()) = trust_.correlation * trust_.power * trust_.inner_resistance;
 }
 
-void Uncertainty::soak() {
-  p_.topLeftCorner(n_, n_).setConstant(squared(start_sigma_K));
+void Uncertainty::soak(float sigma_K) {
+  p_.topLeftCorner(n_, n_).setConstant(squared(sigma_K));
   p_.row(sensor()) = p_.row(housing_.node);
   p_.col(sensor()) = p_.col(housing_.node);
-  p_(sensor(), sensor()) = squared(start_sigma_K);
+  p_(sensor(), sensor()) = squared(sigma_K);
 }
 
 /// What the windings were off by is taken for an error of how fast they warm (the worst case: the next burst adds to

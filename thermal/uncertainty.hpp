@@ -55,7 +55,7 @@ class Uncertainty {
   /// Nothing is known about the temperatures but the states themselves; of the sheet, what the trust says.
   void widen_all();
   /// Whatever the housing turns out to be, the winding is too.
-  void soak();
+  void soak(float sigma_K = start_sigma_K);
   /// Nothing but temperatures and their sigmas has survived.
   void begin_anew(const float (&sigma_K)[max_nodes]);
   /// The ambient is measured.

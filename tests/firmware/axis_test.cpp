@@ -1021,6 +1021,31 @@ TEST(Axis, ASlowLaneThatIsLateInStepWithTheCurrentLosesNoHeat) {
   }
 }
 
+/// A shaft that somebody swings 50 times a second. What it does when the slow lane comes is not what it did.
+TEST(Axis, ASwingInStepWithTheSlowLaneHidesNoHeatOfSpeedAndCoolsNoMore) {
+  constexpr double swing_Hz = 50, fastest_rad_per_s = 600, pi = 3.141592653589793;
+  const auto input_at = [&](double phase_rad) {
+    firmware::Driver driver(bench::driver_setup());
+    for (int i = 1; i <= 4000; ++i) {
+      hal::AxisSample sample = bench::quiet_sample(static_cast<std::uint32_t>(i));
+      const double swing_rad = fastest_rad_per_s / (2 * pi * swing_Hz);
+      sample.rotor_rad =
+          static_cast<float>(3 + swing_rad * std::sin(2 * pi * swing_Hz * i * bench::period_s + phase_rad));
+      (void)driver.axis(0).tick(sample);
+      if (i % 20 == 0) driver.watch();
+      if (i % 200 == 0) driver.slow_tick({{0.0f, false}, 0.0f, false}, {{{25.0f, true}}, {{25.0f, true}}});
+    }
+    return driver.axis(0).core().input();
+  };
+  for (int k = 0; k < 8; ++k) {
+    const thermal::HeatInput<> input = input_at(k * pi / 8);
+    const double mean = 2 / pi * fastest_rad_per_s, mean2 = 0.5 * fastest_rad_per_s * fastest_rad_per_s;
+    EXPECT_NEAR(input[thermal::Drive::speed_rad_per_s], mean, 0.05 * mean) << k;
+    EXPECT_NEAR(input[thermal::Drive::speed2_rad2_per_s2], mean2, 0.05 * mean2) << k;
+    EXPECT_LE(input[thermal::Drive::speed_to_0_8], std::pow(mean, 0.8)) << k;
+  }
+}
+
 TEST(Axis, WhatFlowsThroughTheDiodesBesideARefusedSampleHeats) {
   hal::AxisSample flowing = bench::quiet_sample(0);
   flowing.current_A = {5, -2.5f, -2.5f};

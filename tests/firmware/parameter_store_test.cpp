@@ -266,6 +266,7 @@ TEST(ParameterStore, NoOrderOfCommitsCoolsAnEstimate) {
         ASSERT_EQ(b.store.stage({{0x020B, 0}, drawn(0, 5)}).status, 0);     // margin_sigmas
         ASSERT_EQ(b.store.stage({{0x020C, 0}, drawn(-20, 80)}).status, 0);  // ambient
         ASSERT_EQ(b.store.stage({{0x020E, 0}, drawn(0, 1) < 0.5f ? 0.0f : 1.0f}).status, 0);
+        ASSERT_EQ(b.store.stage({{0x0220, 0}, drawn(0, 1) < 0.5f ? 0.0f : 30.0f}).status, 0);  // third_mass
       }
       ASSERT_EQ(b.store.commit(b.driver).status, 0);
       b.tick(1);

@@ -629,6 +629,21 @@ TEST(Estimator, ASpeedThatIsNotANumberCountsForMoreEachTime) {
   EXPECT_EQ(last, 1e4);
 }
 
+TEST(Estimator, ASpeedThatIsNotANumberCoolsNothing) {
+  auto set = thermal::three_phase_set(reference::ec16());
+  set.links[set.link_count - 1].law = thermal::LinkLaw::speed;
+  set.links[set.link_count - 1].k = 0.05;
+  CoreEstimator blind(set, with(thermal::exact_trust)), standing = blind;
+  HeatInput<> input = current(4);
+  input[Drive::speed_to_0_8] = 100;
+  for (int i = 0; i < 6000; ++i) {
+    blind.tick(input, missing, {25.0f, true});
+    standing.tick(current(4), missing, {25.0f, true});
+    input[Drive::speed_to_0_8] = nan;
+  }
+  EXPECT_NEAR(blind.estimate().housing_degC, standing.estimate().housing_degC, 0.1);
+}
+
 TEST(Estimator, LostTimeIsChargedAtTheMeanOverAllOfIt) {
   CoreEstimator whole(thermal::three_phase_set(reference::ec16()), {}), gap = whole, idle_gap = whole;
   for (int i = 0; i < 7; ++i) whole.tick(current(100), missing);
@@ -701,6 +716,18 @@ TEST(Estimator, HeatSurvivesAResetAndUnknownTimeCountsInFull) {
 }
 
 /// What a sensor that was found out had taken is given back over half a second; a reset meanwhile does not keep it.
+/// Heard by no sensor, a hot housing is known to 20 % of what it is above its surroundings.
+TEST(Estimator, AResetMakesASoakedMotorNoSurer) {
+  Bench b(reference::ec16(), with(thermal::sheet_trust), 25);
+  b.run(3600, 4.5, [] { return missing; });
+  b.run(20, 0, [] { return missing; });
+  ASSERT_GT(b.sigma_K(), 16.0f);
+  ASSERT_LT(b.core.estimate().hottest_degC(), 155);
+  CoreEstimator again(thermal::three_phase_set(b.m), with(thermal::sheet_trust));
+  again.restore(b.core.save(), -1);
+  EXPECT_GE(again.estimate().hottest_margin_degC(), b.core.estimate().hottest_margin_degC() - 0.1f);
+}
+
 TEST(Estimator, AResetTakesNothingOfWhatIsYetToBeGivenBack) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
     Bench b(reference::ec16(), with(trust), 40);
@@ -712,6 +739,18 @@ TEST(Estimator, AResetTakesNothingOfWhatIsYetToBeGivenBack) {
     b.run(0.5, 5, [&] { return stuck; });
     for (int i = 0; i < 50; ++i) again.tick(current(5), stuck);
     EXPECT_GE(again.estimate().hottest_degC(), b.core.estimate().hottest_degC() - 0.1);
+  }
+}
+
+TEST(Estimator, WhatNothingIsKnownOfIsTenKelvinBelowItsLimitHoweverHighThatIs) {
+  for (const double limit_degC : {80.0, 155.0, 200.0, 250.0}) {
+    wire::Motor m = reference::ec16();
+    m.winding_max_degC = limit_degC;
+    CoreEstimator started(thermal::three_phase_set(m), {}), late(thermal::three_phase_set(m), {});
+    started.start_hot();
+    late.tick({}, missing, {25.0f, true}, 201);
+    EXPECT_NEAR(started.estimate().hottest_degC(), limit_degC - 10, 1e-6);
+    EXPECT_NEAR(late.estimate().hottest_degC(), limit_degC - 10, 2.0);
   }
 }
 
@@ -777,6 +816,36 @@ TEST(Estimator, ASensorThatWasFoundOutIsNotBelievedAfterAResetForBeingLessWrong)
     ASSERT_TRUE(again.estimate().flags & thermal::housing_contradicts);
   }
   EXPECT_GE(again.estimate().housing_degC, before_degC);
+}
+
+/// A third mass more or less, with a reset or without one.
+TEST(Estimator, AnotherNumberOfNodesIsNoColderAndMakesNoSensorTrue) {
+  auto with_mass = thermal::three_phase_set(reference::ec16());
+  with_mass.nodes[with_mass.node_count] = {30.0, std::numeric_limits<float>::infinity()};
+  with_mass.links[with_mass.link_count++] =
+      thermal::motor_set::link(with_mass.housing.node, with_mass.node_count++, 0.5);
+  for (const bool reset : {false, true}) {
+    SCOPED_TRACE(reset);
+    Bench b(reference::ec16(), with(thermal::identified_trust), 25);
+    b.run(60, 1);
+    const Reading stuck = b.honest();
+    b.run(600, 8, [&] { return stuck; });
+    ASSERT_TRUE(b.flag(thermal::housing_contradicts));
+    b.core.raise_to(160);
+    const double ambient_degC = b.core.estimate().ambient_degC;
+    const thermal::HeatMemory memory = b.core.save();
+    if (reset) {
+      b.core = CoreEstimator(with_mass, with(thermal::identified_trust));
+      b.core.restore(memory, -1);
+    } else {
+      b.core.replace(with_mass, with(thermal::identified_trust));
+    }
+    EXPECT_GE(b.core.estimate().hottest_degC(), 160 - 1e-3);
+    EXPECT_GE(b.core.estimate().ambient_degC, ambient_degC - 1e-3);
+    b.run(120, 8, [&] { return stuck; });
+    EXPECT_TRUE(b.flag(thermal::housing_contradicts));
+    EXPECT_GT(b.core_error_K(), -5);
+  }
 }
 
 /// A model that is written while a motor works, again and again, makes a sensor that stands still no better than it is.

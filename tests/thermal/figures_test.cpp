@@ -354,6 +354,25 @@ TEST(LookAhead, HeatThatFollowsTheCurrentAtAnySpeedIsForeseenAndPowerOfThePastIs
   EXPECT_NEAR(peak_degC(thermal::Drive::power_W, 10), without, 0.5) << "10 W for 10 ms";
 }
 
+TEST(LookAhead, ACurrentTheOtherWayHeatsAsMuch) {
+  for (const thermal::Drive drive : {thermal::Drive::current_A, thermal::Drive::current_speed}) {
+    thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+    for (std::int8_t k = 0; k < 3; ++k) set.sources[set.source_count++] = {k, drive, 1.0, 0.0};
+    thermal::CoreEstimator core(set, {});
+    thermal::HeatInput<> turning;
+    thermal::set_speed(turning, 5);
+    core.tick(turning, {25.0f, true}, {25.0f, true});
+    const auto peak_degC = [&](float current_A) {
+      const thermal::Piece push{0.5f, current_A};
+      thermal::ProfileRun run;
+      EXPECT_TRUE(run.begin(core, &push, 1, rotating));
+      EXPECT_TRUE(run.go_on(core, 1000));
+      return run.forecast().peak_degC;
+    };
+    EXPECT_EQ(peak_degC(-10), peak_degC(10));
+  }
+}
+
 TEST(LookAhead, UnusableOrEndlessProfilesAreNotFeasible) {
   const auto core = soaked(reference::ec16(), 25);
   const thermal::LookAhead look(core.network());

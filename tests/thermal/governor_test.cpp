@@ -477,6 +477,28 @@ TEST(Governor, WhatTurningAddsToCopperCountsAgainstTheCurrent) {
   EXPECT_NEAR(turning.hold_W, plain.hold_W, 1e-3f) << "and is not taken off twice";
 }
 
+/// More than the winding can give away: the bridge may switch now and then only, and each time it heats.
+TEST(Governor, WhatHeatsWhileTheBridgeSwitchesIsCountedBeforeItDoes) {
+  for (const double switching_W : {8.0, 20.0, 40.0}) {
+    thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+    for (std::int8_t k = 0; k < 3; ++k) set.sources[set.source_count++] = {k, Drive::enabled, switching_W / 3, 0.0};
+    thermal::CoreEstimator core(set, Loop::exact());
+    thermal::Governor governor(Loop::settings(20));
+    float allowance_A = 20;
+    double hottest_degC = 0;
+    for (int i = 0; i < 60000; ++i) {
+      HeatInput<> input;
+      for (int k = 0; k < 3; ++k)
+        input[thermal::phase_drive(k)] = 0.5 * static_cast<double>(allowance_A) * static_cast<double>(allowance_A);
+      input[Drive::enabled] = allowance_A > 0 ? 1 : 0;
+      hottest_degC = std::max(hottest_degC, core.tick(input, {}, {25.0f, true}).hottest_degC());
+      allowance_A = governor.tick(core).current_A;
+    }
+    EXPECT_LE(hottest_degC, 155.5) << switching_W;
+    EXPECT_GT(hottest_degC, 150) << "the limit was never near, so nothing was shown";
+  }
+}
+
 TEST(Governor, WithoutCurrentEachPhaseCountsAsTheHottest) {
   const auto shares = thermal::phase_shares({});
   for (float k : shares.k) EXPECT_EQ(k, 1.0f);

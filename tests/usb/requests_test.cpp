@@ -258,4 +258,31 @@ TEST_F(Linked, SetpointsGoOnWhileItLooksAhead) {
   EXPECT_TRUE(answered);
 }
 
+/// A program that asks again and again keeps an axis from looking for itself: what it saw before is not what is.
+TEST(Ask, WhatIsToldUnaskedIsNothingRatherThanOldWhileAProgramAsks) {
+  boards::host::VirtualBoardOptions o = options();
+  o.motor.phase_resistance_ohm = 0.5;  // a winding as small as an EC 16's
+  o.motor.C1_J_per_K = 1.13;
+  o.motor.R1_K_per_W = 1.08;
+  VirtualBoard board(o);
+  Program program(board);
+  board.advance(40000);
+  program.connect();
+  ASSERT_TRUE(std::isinf(board.driver().axis(0).state().time_left_s)) << "at rest";
+  ASSERT_EQ(board.driver().axis(0).arm(), Status::done);
+  float least_A = 20.0f, told_s = 0.0f;
+  for (int ms = 0; ms < 10000; ++ms) {
+    if (ms % 100 == 0)
+      program.write(Program::framed(Kind::ask, 200, bytes_of(wire::Ask{0, 0}, wire::Segment{60.0f, 0.1f})));
+    ASSERT_EQ(board.driver().axis(0).set_current({0.0f, ms / 10 % 2 == 0 ? 20.0f : -20.0f}), Status::done);  // shaken
+    program.pass(20);
+    (void)program.frames();
+    const firmware::AxisState& now = board.driver().axis(0).state();
+    least_A = std::min(least_A, now.allowance_A);
+    if (ms > 5000) told_s = std::max(told_s, now.time_left_s);
+  }
+  EXPECT_LT(least_A, 8.0f) << "the limit was never near, so nothing was shown";
+  EXPECT_LT(told_s, 2.0f);
+}
+
 }  // namespace
