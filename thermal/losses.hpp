@@ -2,7 +2,7 @@
 // What the winding's heat has besides the sampled current: what a sample cannot see, the power that sensor set B infers
 // from the bus, and the speed features of a heat set. Pure functions of one step's means; SI in, SI out.
 //
-// Knows no motor state. No state; any context, though set_speed calls pow and is for the 100 Hz lane.
+// Knows no motor state. Any context, though SpeedLooks::fill and set_speed call pow and are for the 100 Hz lane.
 #pragma once
 
 #include <cmath>
