@@ -169,7 +169,9 @@ std::string sentence(const Found& found, const Report& r) {
       shared.erase(std::unique(shared.begin(), shared.end()), shared.end());
       if (found.tied.size() > 4) sets += fmt::format(", or {} more", found.tied.size() - 4);
       if (!shared.empty()) sets += "; all of them with " + listed(shared, " and ");
-      if (found.remains_K > 0) sets += fmt::format("; a slow disturbance of {:.2f} K remains", found.remains_K);
+      if (found.remains_K > 0)
+        sets += fmt::format("; the first leaves {:.2f} K, and a slow disturbance of {:.2f} K remains", after_K,
+                            found.remains_K);
       return fmt::format("Something is missing ({}), and these cannot be told apart with this data: {}.", miss, sets);
     }
     case Verdict::unknown_cause:

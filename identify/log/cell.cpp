@@ -179,10 +179,11 @@ bool number_in(std::string_view s, bool decimal_comma, double& value) {
 }
 
 bool number_and_unit_in(std::string_view cell, bool decimal_comma, double& value, std::string& unit) {
-  const std::size_t blank = cell.rfind(' ');
-  if (blank == std::string_view::npos) return false;
-  unit = cell.substr(blank + 1);
-  return unit_named(unit) && number_in(trimmed(cell.substr(0, blank)), decimal_comma, value);
+  const std::size_t blank = cell.rfind(' '), degree = cell.rfind("\u00b0");  // 21.9°C; 1F may be no temperature
+  const std::size_t begin = blank != std::string_view::npos ? blank + 1 : degree;
+  if (begin == std::string_view::npos || begin == 0) return false;
+  unit = cell.substr(begin);
+  return unit_named(unit) && number_in(trimmed(cell.substr(0, begin)), decimal_comma, value);
 }
 
 }  // namespace identify

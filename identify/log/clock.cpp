@@ -41,16 +41,21 @@ void check_time(const Table& table, const Log& log, const std::vector<std::size_
   }
   if (falls.empty()) return;
   constexpr double correction_s = 5;  // a clock that is set right by another jumps by less
+  constexpr double hour_s = 3600;
   const std::size_t first = falls.front();
+  const double missing_s = t[first - 1] - t[first] + median(spacing_s);
   const std::string what_to_do =
-      *std::min_element(spacing_s.begin(), spacing_s.end()) < -correction_s
+      falls.size() == 1 && std::abs(missing_s - hour_s) < correction_s
+          ? "(by an hour, as where summer time ends); add 3600 s to the times from there on if it is that, else split "
+            "the file there or give it a session column"
+      : *std::min_element(spacing_s.begin(), spacing_s.end()) < -correction_s
           ? "(two recordings joined, or two clocks); split the file there or give it a session column"
       : falls.size() > 2
           ? fmt::format("and in {} places (rows out of order); sort the rows by time", falls.size())
           : fmt::format(
                 "(a clock that was set while it recorded); add {:.3g} s to the times from there on, or split "
                 "the file there",
-                t[first - 1] - t[first] + median(spacing_s));
+                missing_s);
   refuse_data(fmt::format("{}, line {}: time runs backwards from {:.12g} to {:.12g} s {}.", table.file,
                           table.line[rows[first]], t[first - 1], t[first], what_to_do));
 }

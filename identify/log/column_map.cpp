@@ -194,7 +194,7 @@ std::string roles_and_units() {
 }
 
 std::string for_a_shell(const std::string& word) {
-  return word.find_first_of(" ()[]'&;$*?") == std::string::npos ? word : "\"" + word + "\"";
+  return word.find_first_of(" ()[]'&;$*?|<>") == std::string::npos ? word : "\"" + word + "\"";
 }
 
 const std::string& own_name(Role role) { return own_names()[static_cast<std::size_t>(role)]; }

@@ -160,6 +160,7 @@ std::optional<Guess> likely_column(const Table& table, const Taken& taken, const
                                : role == Role::time && has_word(name, "micros")        ? ":us"
                                                                                        : "";
       best = Guess{role, name, unit};
+      if (role == Role::phase_a && named_rms(name)) best = Guess{Role::current, name, rms_unit(Role::current)};
       best_doubts = doubts;
     }
   }
@@ -184,7 +185,8 @@ std::optional<Guess> twin_of(const Table& table, std::string q) {
 }
 
 const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung"}}},
-                          housings = {{Role::housing, {"housing", "casing", "case", "yoke", "geh\u00e4use"}},
+                          housings = {{Role::housing,
+                                       {"housing", "casing", "case", "yoke", "geh\u00e4use", "gehaeuse"}},
                                       {Role::housing, {"stator"}}},
                           rooms = {{Role::ambient, {"ambient", "room", "umgebung"}}},
                           coolants = {{Role::coolant, {"coolant"}}};
@@ -192,7 +194,8 @@ const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung
 /// Columns that nothing needs, and that would tell more; `what` each is.
 std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
   const std::pair<std::vector<Likely>, const char*> useful[] = {
-      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "dq"}}}, "the motor's speed"},
+      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "motordrehzahl", "dq"}}},
+       "the motor's speed"},
       {windings, "the winding's temperature"},
       {housings, "the housing's temperature"},
       {rooms, "the room's temperature"},
@@ -220,9 +223,9 @@ void refuse_one_value_a_row(const Table& table) {
     });
     return at == table.names.end() ? std::string() : *at;
   };
-  const std::string value = any({"_value", "value", "state"});
+  const std::string value = any({"_value", "value", "state", "physvalue", "phys_value", "wert", "messwert"});
   const std::string of = any({"_field", "field", "entity_id", "entry", "key", "metric", "name", "signal", "signal_name",
-                              "channel", "topic", "variable"});
+                              "channel", "topic", "variable", "signalname", "kanal"});
   if (!value.empty() && !of.empty())
     refuse_data(
         fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
@@ -266,7 +269,15 @@ void note_doubtful_columns(const Table& table, const std::map<Role, Source>& fou
           "larger wherever the motor turns slower than the supply could drive it. Map that one, if there is one.",
           name, volts == table.names.end() ? "" : fmt::format(" beside '{}'", *volts)));
   }
+  const std::string heat = taken_of(found).of_motor;
+  std::vector<std::vector<std::string>> names;
+  for (const std::string& name : table.names) names.push_back(words_of(name));
   for (const Role role : {Role::housing, Role::core}) {
+    if (foreign(role) && of_another(names, words_of(found.at(role).column), words_of(heat)))
+      notes.push_back(
+          fmt::format("Column '{}' is called as if it were of another motor than '{}'; if it is, nothing "
+                      "here holds.",
+                      found.at(role).column, heat));
     if (foreign(role) && of_a_controller(found.at(role).column) && !of_the_motor(found.at(role).column))
       notes.push_back(
           fmt::format("Column '{}' is called like the temperature of what drives the motor; if it is that, nothing "
@@ -302,7 +313,7 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
             "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
   if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
     const auto guess = likely_column(table, taken_of(taken),
-                                     {{Role::current, {"motor current", "motor_current", "motorcurrent"}},
+                                     {{Role::current, {"motor current", "motor_current", "motorcurrent", "motorstrom"}},
                                       {Role::current, {"phase current", "phase_current", "phasecurrent"}},
                                       {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
                                       {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},

@@ -37,6 +37,9 @@ void mask_frozen(Log& log, Role role) {
   const auto& t = log.of(Role::time);
   std::size_t rows = 0;
   double longest_s = 0, from_s = 0;
+  double most = v[runs.front().first];
+  for (const double x : v) most = std::fmax(most, x);
+  const bool at_its_end = std::all_of(runs.begin(), runs.end(), [&](const auto& run) { return v[run.first] == most; });
   for (const auto& [from, to] : runs) {
     // The first reading of a run was measured, and its repetitions were not; of a sensor that was not up when the log
     // began neither.
@@ -45,9 +48,12 @@ void mask_frozen(Log& log, Role role) {
     for (std::size_t i = began ? from : from + 1; i < to; ++i) v[i] = missing, ++rows;
     if (t[to - 1] - t[from] > longest_s) longest_s = t[to - 1] - t[from], from_s = t[from];
   }
-  log.notes.push_back(
-      fmt::format("{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s); masked.",
-                  own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s));
+  log.notes.push_back(fmt::format(
+      "{} stood frozen at one value in {} stretch{} ({} rows, the longest {:.0f} s from {:.0f} s){}; masked.",
+      own_name(role), runs.size(), runs.size() == 1 ? "" : "es", rows, longest_s, from_s,
+      at_its_end
+          ? fmt::format(", {:g}, the highest that it tells, as where a sensor or an input reaches no further", most)
+          : ""));
 }
 
 /// Of each reading and those around it, within half a second and ten rows either way (half of hurry_s; more rows cost):

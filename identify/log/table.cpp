@@ -124,6 +124,11 @@ bool all_words(const std::vector<std::string_view>& cells, bool decimal_comma) {
   return std::none_of(cells.begin(), cells.end(), told) && !std::all_of(cells.begin(), cells.end(), means_missing);
 }
 
+bool all_differ(std::vector<std::string> names) {
+  std::sort(names.begin(), names.end());
+  return std::adjacent_find(names.begin(), names.end()) == names.end();
+}
+
 /// What a quoted cell says, in one line.
 std::string one_line(std::string_view s) {
   std::string line(s);
@@ -150,7 +155,7 @@ char separator_of(std::string_view text) {
   const std::string_view line = text.substr(0, text.find('\n'));
   char best = ',';
   std::ptrdiff_t most = 0;
-  for (const char c : {',', ';', '\t'}) {
+  for (const char c : {',', ';', '\t', '|'}) {
     const auto n = std::count(line.begin(), line.end(), c);
     if (n > most) best = c, most = n;
   }
@@ -244,6 +249,8 @@ bool name_columns(Table& table, const std::vector<std::string_view>& row, std::s
                 "time_s,current_A,housing_degC) first.");
   }
   while (header.size() > 1 && header.back().empty()) header.pop_back();
+  if (header.size() == 1 && header.front().find_first_of(",;\t") != std::string_view::npos)
+    refuse_line(table, line, "the whole line is one cell, in quotes; export the log without quotes about its lines.");
   for (const auto name : header) table.names.push_back(one_line(trimmed(name)));
   for (std::size_t c = 0; c < header.size(); ++c) {
     if (table.names[c].empty()) table.names[c] = fmt::format("#{}", c + 1);  // pandas leaves that of its index empty
@@ -286,6 +293,18 @@ bool like_thousands(std::string_view cell) {
          cell.find_first_not_of("0123456789,") == std::string_view::npos;
 }
 
+/// The same beside decimals, 1,234.5 or 1.234,5, and as Switzerland and France do it.
+bool sets_thousands_apart(std::string_view cell) {
+  std::string left(cell);
+  for (const std::string_view apart : {"'", "\u2019", "\u00a0", "\u202f"}) {
+    for (std::size_t at = 0; (at = left.find(apart, at)) != std::string::npos;) left.erase(at, apart.size());
+  }
+  const std::size_t first = left.find_first_of(".,"), last = left.find_last_of(".,");
+  const bool both = first != std::string::npos && left[first] != left[last];
+  return (both || left.size() < cell.size()) && left.find_first_of("0123456789") != std::string::npos &&
+         left.find_first_not_of("+-0123456789.,") == std::string::npos;
+}
+
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const bool comma = cells[c].find(',') != std::string_view::npos;
@@ -305,13 +324,16 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
       table.complaints[c] = at_line(
           table, line,
           fmt::format(
-              "'{}' in column '{}' is not a number{}; repair it or leave the cell empty.", shown(cells[c]),
-              shown(table.names[c]),
-              like_a_moment(cells[c])
+              "'{}' in column '{}' is not a number{}.", shown(cells[c]), shown(table.names[c]),
+              sets_thousands_apart(cells[c]) ? ", for it sets thousands apart; export the column without that"
+              : like_a_moment(cells[c])
                   ? ", nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
                     "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
-                    "--period S does without)"
-                  : ""));
+                    "--period S does without); repair it or leave the cell empty"
+              : comma && !decimal_comma && cells[c].find_first_not_of("+-0123456789,") == std::string_view::npos
+                  ? ", for a comma in it is read only where none separates the cells, and as a decimal one; export the "
+                    "log with semicolons or tabs between the cells, and thousands not set apart"
+                  : "; repair it or leave the cell empty"));
     }
     table.columns[c].push_back(value);
     if (!comma && value == std::round(value)) table.has_plain[c] = true;
@@ -400,6 +422,8 @@ Table read_table(const std::string& path) {
     refuse_line(table, 1, "the file is UTF-16; save it as UTF-8 text.");
   if (!is_utf8(text)) text = from_latin_1(text);
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');  // old Macintosh's
+  if (text.starts_with("version https://git-lfs"))
+    refuse_data(path + ": this is Git LFS's pointer to the log and not the log; fetch it with git lfs pull.");
   std::string_view rest = text;
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   if (is_json(rest)) {
@@ -447,8 +471,11 @@ Table read_table(const std::string& path) {
       const std::string wrong = fmt::format(
           "the row has {} of {} cells{}{}", cells.size(), table.names.size(),
           lines > 1 ? fmt::format(", one of them in quotes until line {}", line + lines - 1) : "",
-          closed ? "; repair or delete this line."
-                 : " and the file ends in it, so it was cut off; delete the last line or copy the file again.");
+          whole && separator == ',' && cells.size() > table.names.size()
+              ? "; if commas stand in its numbers as well, export it with semicolons or tabs between the cells, else "
+                "repair or delete this line."
+          : closed ? "; repair or delete this line."
+                   : " and the file ends in it, so it was cut off; delete the last line or copy the file again.");
       if (!whole || !closed || lines > 1) refuse_line(table, line, wrong);
       if (torn++ == 0) first_torn = line, what_is_torn = wrong;
       continue;
@@ -457,9 +484,13 @@ Table read_table(const std::string& path) {
       ++headers;
       continue;
     }
-    if (table.line.empty() && table.units.empty() && all_words(cells, separator != ','))
-      table.units.assign(cells.begin(), cells.end());
-    else
+    if (table.line.empty() && table.units.empty() && all_words(cells, separator != ',')) {
+      std::vector<std::string> below(cells.begin(), cells.end());
+      if (all_differ(below) && !all_differ(table.names))
+        table.names = std::move(below);  // of two header rows the upper one names groups of columns
+      else
+        table.units = std::move(below);
+    } else
       add_row(table, cells, separator != ',', line);
   }
   if (table.names.empty()) {

@@ -337,6 +337,38 @@ TEST(Reader, CommasThatSetThousandsApartAreNoDecimalCommas) {
   EXPECT_EQ(read(three)[0].of(Role::housing)[1], 24.02);
 }
 
+TEST(Reader, ThousandsThatAreSetApartBesideDecimalsAreNoNumbersAndSaidToBeThat) {
+  for (const char* cell : {"\"1,000.25\"", "1'000.25", "1\u00a0000.25", "1\u202f000.25"})
+    says(complaint(head + "999,1,20\n" + cell + ",1,20\n"), "for it sets thousands apart; export the column without");
+  says(complaint("time_s;current_A;housing_degC\n999,5;1;20\n1.000,25;1;20\n"), "sets thousands apart");
+  for (const char* cell : {"1.5x", "1.000.25", "'"})
+    EXPECT_EQ(complaint(head + "999,1,20\n\"" + cell + "\",1,20\n").find("thousands"), std::string::npos) << cell;
+}
+
+TEST(Reader, OfTwoHeaderRowsTheLowerOneNamesTheColumns) {
+  const std::string groups = "Motor,Motor,Temperature,Temperature\n", rows = "0,1,20,21\n1,2,22,23\n";
+  const Log log = read(groups + "time_s,current_A,housing_degC,core_degC\n" + rows)[0];
+  EXPECT_EQ(log.of(Role::core)[1], 23);
+  EXPECT_EQ(read(groups + "time_s,current_mA,housing_degC,core_degC\ns,mA,degF,degC\n" + rows)[0].of(Role::current)[1],
+            0.002);
+  says(complaint("time_s,current_A,housing_degC,housing_degC\ns,A,degC,degC\n" + rows), "stands there twice");
+}
+
+TEST(Reader, CommasInNumbersAndBetweenCellsAreAnsweredWithAnotherSeparator) {
+  says(complaint(head + "0,1,5,20\n1,2,5,21\n"), "has 4 of 3 cells; if commas stand in its numbers as well, export it");
+  says(complaint(head + "0,\"1,5\",20\n1,\"2,5\",21\n"),
+       "'1,5' in column 'current_A' is not a number, for a comma in it is read only where");
+  says(complaint("\"time_s,current_A,housing_degC\"\n\"0,1,20\"\n"), "the whole line is one cell, in quotes");
+}
+
+TEST(Reader, StrokesSeparateCells) {
+  EXPECT_EQ(read("time_s | current_A | housing_degC\n0 | 1,5 | 20\n1 | 2,5 | 21\n")[0].of(Role::current)[1], 2.5);
+}
+
+TEST(Reader, APointerInPlaceOfTheLogIsSaidToBeOne) {
+  says(complaint("version https://git-lfs.github.com/spec/v1\noid sha256:0f\nsize 12345\n"), "git lfs pull");
+}
+
 TEST(Reader, QuotesInQuotesAndASignSetApartAreUnderstood) {
   const auto logs = read(
       "time_s,current_A,housing_degC\n\"\"\"2022-10-26T08:00:00Z\"\"\",-   1.5,+  20.5\n"
@@ -394,6 +426,16 @@ TEST(Reader, ASensorThatIsNotUpAtFirstHasReadNothing) {
   const Log log = read(text)[0];
   EXPECT_TRUE(std::isnan(log.of(Role::housing)[0]));
   says(log.notes[0], "housing_degC stood frozen at one value in 1 stretch (40 rows");
+  EXPECT_EQ(log.notes[0].find("reaches no further"), std::string::npos);
+}
+
+TEST(Reader, ASensorThatStandsAtTheHighestItTellsIsSaidTo) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.2);
+  std::string text = head;
+  for (int i = 0; i < 900; ++i)
+    text += fmt::format("{},1,{:.2f}\n", 0.1 * i, std::min(60.0, 50 + 20 * std::sin(0.01 * i) + noise(random)));
+  says(read(text)[0].notes[0], ", 60, the highest that it tells, as where a sensor or an input reaches no further");
 }
 
 TEST(Reader, AUnitInBracketsThatIsNotKnownIsSaidNotToBeUsed) {
@@ -823,12 +865,16 @@ TEST(Reader, CellsThatNameTheirUnitAreReadInIt) {
   says(log.notes[0], "Units are taken from the table: current_A in mA, housing_degC in K.");
   says(complaint(head + "0,900 mA,20\n60,1 A,21\n"), "line 3: '1 A' in column 'current_A' is not a number");
   says(complaint(head + "0,9 %,20\n60,1 A,21\n"), "line 2: '9 %'");
+  EXPECT_NEAR(read(head + "0,1,68\u00b0F\n1,1,69\u00b0F\n")[0].of(Role::housing)[0], 20, 1e-9);
+  says(complaint(head + "0,1,68F\n1,1,69F\n"), "'68F'");  // may be what a counter says
+  EXPECT_NEAR(read(head + "s,A,\u00b0F\n0,1,68\n1,1,69\n")[0].of(Role::housing)[0], 20, 1e-9);
 }
 
 TEST(Reader, OneValueARowIsRefusedWithWhatToDo) {
   says(complaint("time,_field,_value\n0,current,1\n0,temp,20\n1,current,1\n"),
        "each row has one value ('_value') and what it is of ('_field'); pivot the table");
   says(complaint("Timestamp,Name,Value\n0,/motor/current,1\n0,/motor/temp,20\n"), "what it is of ('Name')");
+  says(complaint("Time;Message;Signal;PhysValue;Unit\n0;MCU;Temp;20;degC\n0;MCU;I;1;A\n"), "one value ('PhysValue')");
 }
 
 TEST(Reader, AColumnCalledTimeIsTheTime) {
@@ -915,6 +961,11 @@ TEST(Reader, WhatAColumnMayBeIsToldByItsWordsAndByWhatMoves) {
   for (const char* column : {"time_s=ms_today:ms", "iq_A=current_motor"}) says(vesc, column);
   says(complaint("time_s,q_current,temp\n0,1,20\n1,2,21\n"), "--column iq_A=q_current");
   says(complaint("time_s,i_a,i_b,temp\n0,1,1,20\n1,2,2,21\n"), "--column phase_a_A=i_a");
+  says(complaint("time_s,I_U_rms,I_V_rms,temp\n0,1,1,20\n1,2,2,21\n"), "--column current_A=I_U_rms:1.2247A");
+  const std::string german =
+      complaint("time_s,Motorstrom,Motordrehzahl,T_Gehaeuse,T_Wicklung\n0,1,1,20,20\n1,2,2,21,22\n");
+  for (const char* said : {"current_A=Motorstrom", "speed_rad_per_s=Motordrehzahl", "housing_degC=T_Gehaeuse"})
+    says(german, said);
   says(complaint("time,motor_rms_current,temp\n0,1,20\n1,2,21\n"), "--column current_A=motor_rms_current:1.2247A");
   says(complaint("Date,Time,P_loss,temp\n1/2/2026,1:00 PM,1,20\n"), "--column power_W=P_loss");
   says(complaint("time_s,Power (W),Stator Body (\u00b0C)\n0,1,20\n"),
@@ -1078,6 +1129,18 @@ TEST(Reader, AControllersTemperatureThatWasMappedIsSaidToBeOne) {
     EXPECT_EQ(notes_of(name).find("drives"), std::string::npos) << name;
 }
 
+TEST(Reader, ATemperatureCalledAsOfAnotherMotorIsSaidToBe) {
+  const auto notes_with = [](const std::string& housing) {
+    ColumnMap map;
+    add_column(map, "iq_A=M1 Iq [A]");
+    add_column(map, "housing_degC=" + housing);
+    const std::string table = "time_s,M1 Iq [A],M2 Iq [A],M1 T case,M2 T case\n0,1,0,20,20\n1,2,1,21,20\n";
+    return fmt::format("{}", fmt::join(read(table, map)[0].notes, " "));
+  };
+  says(notes_with("M2 T case"), "Column 'M2 T case' is called as if it were of another motor than 'M1 Iq [A]'");
+  EXPECT_EQ(notes_with("M1 T case").find("another motor"), std::string::npos);
+}
+
 TEST(Masks, ReadingsOfALooseSensorAreMaskedAndThoseOfAWindingAreNot) {
   const std::string text = rows_with([](int i) { return i >= 80 && i < 120 ? fmt::format("{}", 150 + i % 2) : ""; });
   const Log log = read(text)[0];
@@ -1208,6 +1271,9 @@ TEST(Reader, WhatToDoAboutTimeThatRunsBackwardsGoesByHowItDoes) {
        "line 22: time runs backwards from 19 to 17 s (a clock that was set while it recorded); add 3 s to the times");
   says(complaint(mixed), "in 20 places (rows out of order); sort the rows by time");
   says(complaint(joined), "split the file there or give it a session column");
+  says(complaint("time_s,current_A,housing_degC\n2026-10-25 02:59:58,1,20\n2026-10-25 02:59:59,1,20\n"
+                 "2026-10-25 02:00:00,1,21\n2026-10-25 02:00:01,1,21\n"),
+       "(by an hour, as where summer time ends); add 3600 s to the times from there on");
 }
 TEST(Reader, AHeaderInAUnitOfOneLetterIsRefusedWithTheConversion) {
   says(complaint("time_s,current_A,housing_F\n0,1,20\n"), "--column housing_degC=housing_F:F");

@@ -690,6 +690,33 @@ TEST(SlowSearch, WhereQuietSensorsShowASmallPartThatIsLeftTheLargerIsNamed) {
   EXPECT_EQ(identify::search(problem, strict).verdict, Verdict::unknown_cause);
 }
 
+/// The housing's sensor comes off half way, which no cause in the table is.
+TEST(SlowReport, OfATieThatLeavesKelvinsItIsSaidHowMany) {
+  tests::BenchOptions o;
+  o.motor = {.ohm = 0.25, .R1 = 0.9, .R2 = 2.4, .C1 = 35, .C2 = 220};
+  o.seconds = 2400, o.rate_Hz = 5, o.core_every_s = 1, o.seed = 4;
+  o.white_K = 0.08, o.slow_K = 0.02, o.step_K = 0, o.core_white_K = 0.15;
+  double current_A = 0, until_s = 40;
+  o.current_A = [&](double t, std::mt19937_64& random) {
+    if (t < 40 || t > 0.88 * o.seconds) return 0.0;
+    for (std::uniform_real_distribution<double> uniform; t >= until_s; until_s = t + 4 + 56 * uniform(random))
+      current_A = uniform(random) < 0.3 ? 0 : 12 * uniform(random);
+    return current_A;
+  };
+  auto logs = tests::bench_logs({o});
+  const auto& t = logs[0].of(identify::Role::time);
+  const auto& room = logs[0].of(identify::Role::ambient);
+  auto& housing = logs[0].of(identify::Role::housing);
+  for (std::size_t i = t.size() / 2, off = i; i < t.size(); ++i) {
+    const double left = std::exp((t[off] - t[i]) / 60);  // it cools to the room's temperature within minutes
+    housing[i] = room[i] + left * (housing[off - 1] - room[i]) + 0.02 * (housing[i] - housing[i - 1]);
+  }
+  const auto report = identify::discover(logs, std::nullopt);
+  ASSERT_EQ(report.verdict, Verdict::ambiguous);
+  says(report.sentence, "; the first leaves ");
+  says(report.sentence, " K, and a slow disturbance of ");
+}
+
 TEST(SlowSearch, WhatABoardIsHandedFollowsAWindingReadAllTheTime) {
   const Problem problem = of_wandering_heat(0.1, 0.05);
   const auto found = identify::search(problem);
