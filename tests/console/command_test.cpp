@@ -630,7 +630,7 @@ TEST_F(Commands, ASheetAsksForTheEncodersAngleAndForABoardThatKnowsAllOfIt) {
   const std::string sheet = "motor " HOTCORE_SOURCE_DIR "/boards/motors/ec-16-40w.toml --yes --supply 48";
   refused(sheet, 2, "This board's firmware knows no C1_J_per_K");
   board_->parameters.push_back({0x0106, "angle_offset", "rad", "", -4.0f, 4.0f, std::nanf("")});
-  for (const std::uint8_t axis : {0, 1}) board_->in_force[{0x0106, axis}] = std::nanf("");
+  for (const auto axis : {std::uint8_t{0}, std::uint8_t{1}}) board_->in_force[{0x0106, axis}] = std::nanf("");
   console_.hang_up();
   refused(sheet, 2, "axis0.angle_offset_rad is unset: say what the encoder reads");
   refused(sheet + " --angle-offset 1", 2, "knows no C1_J_per_K");
