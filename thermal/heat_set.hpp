@@ -39,7 +39,7 @@ enum class Drive : std::uint8_t {
   current_speed,    // |i| |w|, without the ripple
   enabled,          // share of the time the bridge switched
   power_W,          // heat known from elsewhere: measured, or from bus power (sensor set B)
-  speed_to_0_8,     // mean of |w|^0.8, for forced convection
+  speed_to_0_8,     // |w|^0.8, for forced convection: its mean, or less
   count
 };
 constexpr bool is_current_square(Drive drive) { return drive >= Drive::phase_a_A2 && drive <= Drive::current_A2; }
