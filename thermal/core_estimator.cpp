@@ -212,7 +212,7 @@ void CoreEstimator::follow_housing(float above_model_K) {
   Sight seen = sensor_sight(above_model_K);
   const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
   const auto verdict = watch_.judge(above_model_K, uncertainty_.sigma_K(seen), kept_K, ambient_degC_);
-  if (verdict.lives) doubted_K_.setZero();
+  if (verdict.warms) doubted_K_.setZero();
   if (verdict.believed) {
     seen.above_K = verdict.counts_as_above_K;
     correct(seen, verdict.most_down_K, HousingWatch::window_steps);

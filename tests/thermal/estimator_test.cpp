@@ -954,6 +954,33 @@ TEST(Estimator, ASensorThatCameOffDuringAResetLetsNoWindingPassItsLimit) {
   }
 }
 
+/// It cools, and a model that was told of a lag takes the housing for as cold as that: both fall.
+TEST(Estimator, ASensorThatCameOffDuringAResetProvesNothingByCooling) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      for (const double off_s : {5.0, 10.0, 20.0}) {
+        Restarted hot(m, most_A, trust, false);
+        auto set = thermal::three_phase_set(m);
+        set.housing.lag_s = 10;
+        const thermal::HeatMemory memory = hot.b.core.save();
+        hot.b.core = CoreEstimator(set, with(trust));
+        hot.b.core.restore(memory, -1);
+        double sensor_degC = static_cast<double>(hot.b.plant.degC[1]);
+        const auto off = [&] {
+          sensor_degC += (25 - sensor_degC) * 0.01 / off_s;
+          return Reading{static_cast<float>(sensor_degC + hot.b.noise(hot.b.seed)), true};
+        };
+        hot.run(10, 0, off);
+        for (int i = 0; i < 20; ++i) {
+          hot.run(20, hot.most_A, off);
+          hot.run(10, 0, off);
+        }
+        EXPECT_LE(hot.hottest_degC, 155 + 3) << "R1 " << m.R1_K_per_W << ", off within " << off_s << " s";
+      }
+    }
+  }
+}
+
 /// What the memory of a hot motor costs one that has cooled meanwhile: until its housing has followed a load by 3 K.
 TEST(Estimator, AMotorThatHasCooledDuringAResetIsBelievedWithinAMinuteOfLoad) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
