@@ -1025,6 +1025,27 @@ TEST(Estimator, AStartThatIsTooHotDoesNotContradictAnHonestSensor) {
   }
 }
 
+/// The supply of a cold motor that begins without a memory bounces: what is remembered is the guess.
+TEST(Estimator, AResetMakesNoMemoryOfAGuessThatAnHonestSensorContradicts) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const wire::Motor& m : {reference::ec16(), reference::powermax()}) {
+      for (const double until_s : {0.2, 1.0, 5.0, 20.0}) {
+        Bench bench(m, with(trust), 25);
+        bench.core.start_hot();
+        bench.run(until_s, 0);
+        const thermal::HeatMemory memory = bench.core.save();
+        bench.core = CoreEstimator(thermal::three_phase_set(m), with(trust));
+        bench.core.restore(memory, -1);
+        for (int i = 0; i < 12; ++i) {
+          bench.run(10, 0);
+          EXPECT_FALSE(bench.flag(thermal::housing_contradicts)) << "R1 " << m.R1_K_per_W << ", after " << until_s;
+        }
+        EXPECT_NEAR(bench.core_error_K(), 0, 5) << "R1 " << m.R1_K_per_W << ", after " << until_s << " s";
+      }
+    }
+  }
+}
+
 TEST(Estimator, AnUnsureWindingIsRestoredAsUnsure) {
   CoreEstimator core(thermal::three_phase_set(reference::ec16()), {});
   core.restore({4, {140, 140, 140, 60}, {120, 120, 120, 5}, 40}, -1);
