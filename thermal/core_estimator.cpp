@@ -178,8 +178,8 @@ void CoreEstimator::meet_sensor(float reading_degC) {
   raise_to(static_cast<float>(housing_of_degC(sensor_degC_)));
 }
 
-/// The minute is over, and a start that was a guess would contradict the sensor for hours: it is as cold as it reads,
-/// with what is left as margin.
+/// The minute is over, and a start that was a guess, or the memory of one, would contradict the sensor for hours: it is
+/// as cold as it reads, with what is left as margin.
 void CoreEstimator::doubt(float left_K) {
   meet_copy();
   degC_.array() -= static_cast<double>(left_K);
@@ -204,7 +204,9 @@ void CoreEstimator::meet_housing(float reading_degC, float above_model_K) {
     kept_K_.head(n_) += (Vector::Constant(n_, fall_K[h]) - fall_K).cast<float>();
   }
   const float left_K = static_cast<float>(sensor_degC_) - reading_degC;
-  if (known && guessed_ && left_K > least_gate_K) doubt(left_K);
+  if (!known) return;
+  if ((guessed_ || remembers_) && left_K > least_gate_K) doubt(left_K);
+  if (doubted_K_[h] > least_gate_K) watch_.forget_movement();  // a model that was too hot cooled: no test
 }
 
 /// From then on only as far as its sensor is believed.
@@ -212,7 +214,7 @@ void CoreEstimator::follow_housing(float above_model_K) {
   Sight seen = sensor_sight(above_model_K);
   const float kept_K = std::fmax(kept_K_[sensor()], 0.0f);
   const auto verdict = watch_.judge(above_model_K, uncertainty_.sigma_K(seen), kept_K, ambient_degC_);
-  if (verdict.lives) doubted_K_.setZero();
+  if (verdict.warms) doubted_K_.setZero();
   if (verdict.believed) {
     seen.above_K = verdict.counts_as_above_K;
     correct(seen, verdict.most_down_K, HousingWatch::window_steps);

@@ -91,6 +91,7 @@ HousingWatch::Verdict HousingWatch::judge(float above_model_K, float sigma_K, fl
   const bool tested = expected_K >= enough_movement_K;
   const bool fallen = moved_K > off_share * expected_K && moved_K > expected_K + off_K;
   verdict.lives = tested && moved_K >= alive_share * expected_K && !fallen;
+  verdict.warms = verdict.lives && model_moved_K_ > 0.0f;
   if (verdict.lives) {
     pulled_K_ = 0.0f;
     trusted_ambient_degC_ = ambient_degC;

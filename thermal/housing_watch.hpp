@@ -41,6 +41,7 @@ class HousingWatch {
 
   struct Verdict {
     bool lives;               // the reading has moved with the model, far enough to prove it
+    bool warms;               // and upwards: one that has come off cools as well, and a model that follows it
     bool believed;            // or else it counts for nothing,
     bool believed_till_now;   // and what the sensor has taken is to be given back
     float counts_as_above_K;  // how much more than the model's it is taken for

@@ -954,6 +954,33 @@ TEST(Estimator, ASensorThatCameOffDuringAResetLetsNoWindingPassItsLimit) {
   }
 }
 
+/// It cools, and a model that was told of a lag takes the housing for as cold as that: both fall.
+TEST(Estimator, ASensorThatCameOffDuringAResetProvesNothingByCooling) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const auto& [m, most_A] : {std::pair{reference::ec16(), 20.0f}, std::pair{reference::powermax(), 60.0f}}) {
+      for (const double off_s : {5.0, 10.0, 20.0}) {
+        Restarted hot(m, most_A, trust, false);
+        auto set = thermal::three_phase_set(m);
+        set.housing.lag_s = 10;
+        const thermal::HeatMemory memory = hot.b.core.save();
+        hot.b.core = CoreEstimator(set, with(trust));
+        hot.b.core.restore(memory, -1);
+        double sensor_degC = static_cast<double>(hot.b.plant.degC[1]);
+        const auto off = [&] {
+          sensor_degC += (25 - sensor_degC) * 0.01 / off_s;
+          return Reading{static_cast<float>(sensor_degC + hot.b.noise(hot.b.seed)), true};
+        };
+        hot.run(10, 0, off);
+        for (int i = 0; i < 20; ++i) {
+          hot.run(20, hot.most_A, off);
+          hot.run(10, 0, off);
+        }
+        EXPECT_LE(hot.hottest_degC, 155 + 3) << "R1 " << m.R1_K_per_W << ", off within " << off_s << " s";
+      }
+    }
+  }
+}
+
 /// What the memory of a hot motor costs one that has cooled meanwhile: until its housing has followed a load by 3 K.
 TEST(Estimator, AMotorThatHasCooledDuringAResetIsBelievedWithinAMinuteOfLoad) {
   for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
@@ -994,6 +1021,27 @@ TEST(Estimator, AStartThatIsTooHotDoesNotContradictAnHonestSensor) {
         EXPECT_LE(one->hottest_degC, 155 + 3);
       }
       EXPECT_GE(unknown.A2s, 0.95 * cold.A2s) << "R1 " << m.R1_K_per_W;
+    }
+  }
+}
+
+/// The supply of a cold motor that begins without a memory bounces: what is remembered is the guess.
+TEST(Estimator, AResetMakesNoMemoryOfAGuessThatAnHonestSensorContradicts) {
+  for (const thermal::Trust trust : {thermal::sheet_trust, thermal::identified_trust}) {
+    for (const wire::Motor& m : {reference::ec16(), reference::powermax()}) {
+      for (const double until_s : {0.2, 1.0, 5.0, 20.0}) {
+        Bench bench(m, with(trust), 25);
+        bench.core.start_hot();
+        bench.run(until_s, 0);
+        const thermal::HeatMemory memory = bench.core.save();
+        bench.core = CoreEstimator(thermal::three_phase_set(m), with(trust));
+        bench.core.restore(memory, -1);
+        for (int i = 0; i < 12; ++i) {
+          bench.run(10, 0);
+          EXPECT_FALSE(bench.flag(thermal::housing_contradicts)) << "R1 " << m.R1_K_per_W << ", after " << until_s;
+        }
+        EXPECT_NEAR(bench.core_error_K(), 0, 5) << "R1 " << m.R1_K_per_W << ", after " << until_s << " s";
+      }
     }
   }
 }
