@@ -140,6 +140,7 @@ TEST(Memory, ASpoiltBackupMemoryFallsBackOnTheJournalWhichCountsForOneStartOnly)
   auto pcb = small_motors(heard_s);
   ASSERT_TRUE(pcb->arm());
   push(*pcb, 0.2);
+  push_to_between_ticks(*pcb);
   const double before = estimated_degC(*pcb);
   pcb->chip.set_supply(2.8);
   pcb->run_for(0.0015);
