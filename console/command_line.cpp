@@ -18,7 +18,7 @@ constexpr const char* examples =
     "  hotcore run \"5A 1s, 0A 0.5s\" --axis 1         arm, play a course of current, disarm\n"
     "  hotcore --sim run \"20A 20ms, -20A 40ms, 20A 20ms\" --times 40   shaken until heat limits it\n"
     "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
-    "  hotcore motor ec-16-40w --supply 48           the sheet of the motor that hangs on axis 0, with a yes\n"
+    "  hotcore motor ec-16-40w --supply 48           tell axis 0 the sheet of its motor\n"
     "  hotcore backup mine.toml                      all parameters into a file\n"
     "  hotcore log --out run.csv --seconds 60        a log that identify reads as it is\n"
     "  hotcore fault                                 what happened, the evidence, what to do\n"

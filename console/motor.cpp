@@ -85,7 +85,7 @@ void add_motor(CLI::App& app, Console& console) {
     return std::pair{made, a};
   };
   command("model", "put a model of 'identify --write-model' in force", "the model", take_model);
-  const auto [sheet, a] = command("motor", "tell an axis its motor's sheet, and forget what was found of another",
+  const auto [sheet, a] = command("motor", "tell an axis the sheet of its motor, and forget another's",
                                   "a motor sheet (.toml), or the name of one in boards/motors", take_sheet);
   sheet->add_option("--supply", a->supply_V, "what feeds the board, V")->required()->check(between(1, 1000));
   sheet
