@@ -57,7 +57,7 @@ Outcome put_in_force(Console& console, int axis, const Values& before, const Val
     changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
   }
   for (const Assignment& assignment : assignments) check(assignment, whose);
-  if (!console.options.json) fmt::print("{}", text);
+  if (!console.options.json) put(text);
   const bool held = assignments.empty(), written = !held && agreed(console, consent);
   const bool saved = consent.save && (held || written);
   if (written) session.set(assignments);

@@ -109,7 +109,7 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
     }
     std::string text = curves.drawn(terminal_width(), 8, in_colours());
     if (on_terminal()) {
-      if (lines > 0) fmt::print("\033[{}A\033[J", lines);
+      if (lines > 0) put(fmt::format("\033[{}A\033[J", lines));
       const TerminalSize size = terminal_size();
       const Fitted shown = fitted(text, size.columns, size.rows);
       text = shown.text, lines = shown.rows;

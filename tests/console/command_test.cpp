@@ -695,6 +695,13 @@ TEST_F(Commands, WithJsonAnErrorIsJsonToo) {
 // ---- small parts
 // ------------------------------------------------------------------------------------------------------
 
+TEST_F(Commands, WithJsonWhatIsNoUtf8IsReplacedAndEndsNothing) {
+  const Said said = say("--json get \xE4");
+  EXPECT_EQ(said.code, 2);
+  EXPECT_EQ(nlohmann::json::parse(said.out, nullptr, false)["exit_code"], 2) << said.out;
+  EXPECT_TRUE(json("backup " + path("\xE4.toml")).contains("written"));
+}
+
 TEST(Profile, UnitsAreUnderstood) {
   const auto pieces = console::profile_in("20A 0.3s, -500mA 200 ms,6 2min", 10);
   ASSERT_EQ(pieces.size(), 3u);
