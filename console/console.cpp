@@ -29,7 +29,14 @@ bool install() {
 Session& Console::session() {
   if (!session_) {
     session_.emplace(options.sim ? simulated_(options) : usb().open(options.serial));
+    opened_ = options;
   }
+  const bool same_place = !options.sim || (opened_.sim && options.motor == opened_.motor);
+  const bool same_serial =
+      options.serial == opened_.serial || std::string(session_->hello().serial).rfind(options.serial, 0) == 0;
+  if (!same_place || !same_serial)
+    refuse(fmt::format("This prompt talks to {}; end it, and say --serial, --sim or --motor where hotcore is started.",
+                       session_->name()));
   return *session_;
 }
 

@@ -34,7 +34,8 @@ class Console {
 
   Options options;
 
-  /// The conversation with the chosen board, begun when first asked for.
+  /// The conversation with the chosen board, begun when first asked for. Throws UserError (usage) where it is with
+  /// another board than the options choose by now.
   Session& session();
   /// Ends it: the next session() looks for the board anew.
   void hang_up() { session_.reset(); }
@@ -49,6 +50,7 @@ class Console {
   std::function<std::unique_ptr<link::Transport>(const Options&)> simulated_;
   std::optional<link::Usb> usb_;
   std::optional<Session> session_;
+  Options opened_;  // what the session was begun with
 };
 
 /// Writes to standard output, now. Throws UserError (usage) when it takes no more, as a full disk; a reader who left

@@ -702,6 +702,15 @@ TEST_F(Commands, WithJsonWhatIsNoUtf8IsReplacedAndEndsNothing) {
   EXPECT_TRUE(json("backup " + path("\xE4.toml")).contains("written"));
 }
 
+TEST_F(Commands, ACommandForAnotherBoardIsNotObeyedByThisOne) {
+  ASSERT_EQ(say("stop").code, 0);
+  EXPECT_EQ(say("stop --serial FAKE").code, 0);  // this one
+  refused("run \"1A 0.1s\" --serial OTHER", 2, "This prompt talks to fake FAKE01; end it");
+  console_.options.serial.clear();
+  EXPECT_EQ(console::run_line(console_, [&](CLI::App& app) { app.parse("run \"1A 0.1s\" --motor other --sim"); }), 2);
+  EXPECT_EQ(board_->setpoints, 0);
+}
+
 TEST(Profile, UnitsAreUnderstood) {
   const auto pieces = console::profile_in("20A 0.3s, -500mA 200 ms,6 2min", 10);
   ASSERT_EQ(pieces.size(), 3u);

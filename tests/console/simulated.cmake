@@ -51,6 +51,8 @@ expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
 set(typed "mode torque --axis 1\nrun \"20mNm 0.1s\" --axis 1\nrun \"3A 0.1s\"\nmode\nquit\n")
 # 3/2 pole pairs flux linkage of this motor: 6.5 mN m/A, so 3.1 A.
 expect(prompt_in_torque_mode 0 "axis 1: torque mode, setpoints in N m.*1    ready   torque .*Done in 0.1[0-9]* s and disarmed: peak current 3.[1-3] A.*Done in 0.1.*axis 0: current mode.*axis 1: torque mode" ${sim})
+set(typed "get axis0.pole_pairs\nrun \"3A 0.1s\" --serial OTHER\nquit\n")
+expect(prompt_asked_for_another_board 2 "axis0.pole_pairs.*This prompt talks to .*SIM0; end it" ${sim})
 set(typed "")
 expect(standard_output_that_is_full 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim get > /dev/full")
 expect(a_full_disk_ends_a_run 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim run '1A 60s' > /dev/full")
