@@ -111,6 +111,7 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
         course.erase(course.begin());
       }
       driven = play(course, a.turning ? turning_rad_per_s : 0);
+      armed.disarm();
     }
     recorder.finish();
   } catch (const UserError& error) {

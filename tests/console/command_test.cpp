@@ -166,6 +166,14 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
+TEST_F(Commands, ABoardThatDoesNotAnswerADisarmIsNotCalledDisarmed) {
+  board_->before = [](Kind kind) { return kind != Kind::disarm; };
+  const Said said = say("run \"1A 0.1s\"");
+  EXPECT_EQ(said.code, 7);
+  EXPECT_NE(said.err.find("no answer when asked to disarm axis 0"), std::string::npos) << said.err;
+  EXPECT_EQ(said.out.find("Done"), std::string::npos) << said.out;
+}
+
 TEST_F(Commands, NoTemperatureIsToldThatTheBoardDidNotSay) {
   for (const std::string line : {"arm --seconds 0", "run \"1A 0.0000001ms\""}) {
     const auto shortest = json(line);
