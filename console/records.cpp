@@ -119,6 +119,11 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
   session.unsubscribe();
 }
 
+/// Waits until then, or Ctrl-C.
+void wait_or_stop(Session& session, double time_s) {
+  while (!interrupted() && session.now_s() < time_s) session.wait_until(std::min(session.now_s() + 0.1, time_s));
+}
+
 void watch(Console& console, const std::vector<std::string>& names, const std::string& axis, double rate_Hz,
            double seconds) {
   if (!names.empty()) return watch_signals(console, names, rate_Hz, seconds);
@@ -126,8 +131,11 @@ void watch(Console& console, const std::vector<std::string>& names, const std::s
   Live live(axis == "both" ? 3 : axis == "1" ? 2 : 1);
   BoardTime time(session.hello().pwm_Hz);
   const double start_s = session.now_s();
-  for (double next_s = start_s; !interrupted() && next_s - start_s <= seconds; next_s += 1.0 / rate_Hz) {
-    session.wait_until(next_s);
+  // Of a rate that the board does not reach, as many as it does; none is made up for.
+  for (double next_s = start_s; next_s - start_s <= seconds;
+       next_s = std::max(next_s + 1.0 / rate_Hz, session.now_s())) {
+    wait_or_stop(session, next_s);
+    if (interrupted()) break;
     const wire::State state = session.state();
     const double time_s = time.at(state.period);
     if (console.options.json)

@@ -349,6 +349,28 @@ TEST_F(Commands, WatchGivesALineForEachState) {
   EXPECT_NE(curves.out.find("axis0.iq_A 22"), std::string::npos) << curves.out;
 }
 
+TEST_F(Commands, AWatchEndsWhenItShouldThoughTheBoardIsSlowerThanItsRate) {
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::state) board_->pass(0.01);
+    return true;
+  };
+  const Said said = say("watch --json --rate 1000 --seconds 1");
+  EXPECT_EQ(said.code, 0) << said.err;
+  EXPECT_LT(board_->now_s, 1.1);
+  const auto states = std::count(said.out.begin(), said.out.end(), '\n');
+  EXPECT_TRUE(states > 90 && states < 105) << states;
+}
+
+TEST_F(Commands, CtrlCEndsAWatchThatWaitsForItsNextState) {
+  board_->passing = [&] {
+    if (board_->now_s > 5) std::raise(SIGINT);
+  };
+  console::interrupted();  // from here on noted only
+  EXPECT_EQ(say("watch --json --rate 0.01").code, 0);
+  console::forget_interrupt();
+  EXPECT_LT(board_->now_s, 6);
+}
+
 TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
   const auto said = json("log --out " + path("x.csv") + " --seconds 2 --rate 50");
   EXPECT_NEAR(said["rows"], 101, 1);

@@ -56,6 +56,8 @@ struct FakeBoard {
   std::vector<wire::Segment> course;  // last
   /// Sees each request before it is answered; false: no answer comes.
   std::function<bool(wire::Kind)> before = [](wire::Kind) { return true; };
+  /// Sees time pass.
+  std::function<void()> passing = [] {};
   /// May change an answer's payload before it is framed.
   std::function<void(wire::Kind, std::vector<std::uint8_t>&)> twist = [](wire::Kind, std::vector<std::uint8_t>&) {};
 
@@ -82,6 +84,7 @@ struct FakeBoard {
   }
   void pass(double seconds) {
     now_s += seconds;
+    passing();
     while (!watched_.empty() && next_row_s_ <= now_s) push_row();
   }
 
