@@ -228,9 +228,11 @@ void capture(Console& console, const CaptureArguments& a) {
   try {
     for (int next = 0; next < status.rows;) {
       values.clear();
-      next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values);
+      std::uint32_t period = 0;
+      next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values, period);
       for (std::size_t at = 0; at < values.size(); at += row.size()) {
-        const auto periods = static_cast<double>((file.rows() - status.pre) * status.decimation);
+        const auto periods = static_cast<std::int32_t>(period - status.trigger_period);  // wraps
+        period += status.decimation;
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(at), row.size(), row.begin());
         file.add(periods / double{session.hello().pwm_Hz}, row);
         for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);

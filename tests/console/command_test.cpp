@@ -400,6 +400,15 @@ TEST_F(Commands, CaptureWritesRowsAroundItsTrigger) {
   EXPECT_NE(text.find("\n0.003450,99,99\n"), std::string::npos);
 }
 
+TEST_F(Commands, PeriodsThatABoardLostAreTimeInItsCapture) {
+  board_->lost_periods = 2000;  // 0.1 s
+  ASSERT_EQ(say("capture axis0.iq_A --pre 30 --post 400 --out " + path("c.csv")).code, 0);
+  const std::string text = content(path("c.csv"));
+  EXPECT_NE(text.find("\n-0.001500,0\n"), std::string::npos) << text;  // as without a gap
+  EXPECT_NE(text.find("\n0.000000,30\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n0.119950,429\n"), std::string::npos) << text;
+}
+
 TEST_F(Commands, TheListNamesTheSimulatedBoard) { EXPECT_EQ(json("list")[0]["serial"], "FAKE01"); }
 
 TEST_F(Commands, UdevPrintsARule) {
