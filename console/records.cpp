@@ -194,8 +194,11 @@ void capture(Console& console, const CaptureArguments& a) {
                            a.post,
                            a.decimation};
   if (!a.trigger.empty()) {
-    const Target trigger = session.signals().named(a.trigger).front();
-    order.trigger = {static_cast<std::uint8_t>(trigger.what->id), trigger.axis};
+    const std::vector<Target> triggers = session.signals().named(a.trigger);
+    if (triggers.size() > 1)
+      refuse(fmt::format("--trigger {}: one signal triggers, and this may be {} or {}; say which.", a.trigger,
+                         full_name(triggers.front()), full_name(triggers.back())));
+    order.trigger = {static_cast<std::uint8_t>(triggers.front().what->id), triggers.front().axis};
   }
   const std::size_t most_rows =
       session.hello().capture_words / (signals.size() + 1);  // one word a row is its time stamp

@@ -409,6 +409,12 @@ TEST_F(Commands, PeriodsThatABoardLostAreTimeInItsCapture) {
   EXPECT_NE(text.find("\n0.119950,429\n"), std::string::npos) << text;
 }
 
+TEST_F(Commands, ATriggerIsOneSignal) {
+  refused("capture axis1.iq_A --trigger iq_A --edge rising --out " + path("c.csv"), 2,
+          "this may be axis0.iq_A or axis1.iq_A; say which");
+  EXPECT_TRUE(is_empty());
+}
+
 TEST_F(Commands, TheListNamesTheSimulatedBoard) { EXPECT_EQ(json("list")[0]["serial"], "FAKE01"); }
 
 TEST_F(Commands, UdevPrintsARule) {
