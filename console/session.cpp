@@ -233,9 +233,10 @@ void Session::subscribe(const std::vector<Target>& signals, std::uint16_t decima
   payload.add(wire::Subscribe{decimation});
   for (const Target& signal : signals)
     payload.add(wire::SignalAddress{static_cast<std::uint8_t>(signal.what->id), signal.axis});
+  request(Kind::subscribe, payload, "send telemetry");
+  // Rows that came before the answer are of what was subscribed before.
   subscribed_ = static_cast<int>(signals.size());
   taker_ = std::move(taker);
-  request(Kind::subscribe, payload, "send telemetry");
 }
 
 void Session::unsubscribe() {

@@ -371,6 +371,25 @@ TEST_F(Commands, CtrlCEndsAWatchThatWaitsForItsNextState) {
   EXPECT_LT(board_->now_s, 6);
 }
 
+TEST_F(Commands, RowsOfAnEarlierSubscriptionStayOutOfALog) {
+  ASSERT_EQ(say("log axis0.iq_A --out " + path("a.csv") + " --seconds 0.1 --rate 1000").code, 0);
+  // One that was broken off left its telemetry on; some of it is under way while the next one is ordered.
+  int orders = 0;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::subscribe && ++orders == 2) board_->unplugged = true;
+    return true;
+  };
+  EXPECT_EQ(say("log axis0.iq_A --out " + path("b.csv") + " --seconds 0.1 --rate 1000").code, 7);
+  board_->unplugged = false;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::subscribe) board_->pass(0.01);
+    return true;
+  };
+  board_->to_pc.clear();
+  ASSERT_EQ(say("log axis0.bus_V --out " + path("c.csv") + " --seconds 0.1 --rate 100").code, 0);
+  EXPECT_EQ(content(path("c.csv")).find(",22\n"), std::string::npos) << content(path("c.csv"));  // iq_A
+}
+
 TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
   const auto said = json("log --out " + path("x.csv") + " --seconds 2 --rate 50");
   EXPECT_NEAR(said["rows"], 101, 1);
