@@ -555,6 +555,22 @@ TEST_F(Commands, AFullDiskEndsALogAtOnceAndLeavesWholeRows) {
       << said.err << rows;
 }
 
+TEST_F(Commands, ADiskThatIsFullFromTheStartLeavesNoFile) {
+  rlimit usual{};
+  getrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_IGN);
+  board_->before = [&](Kind kind) {
+    rlimit full = usual;
+    if (kind == Kind::get) full.rlim_cur = 10, setrlimit(RLIMIT_FSIZE, &full);  // the preamble's
+    return true;
+  };
+  const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("--sim log --out " + path("x.csv")); });
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(code, 2);
+  EXPECT_TRUE(is_empty());  // no .part either: the next log would take it for another's
+}
+
 TEST_F(Commands, ADeviceIsWrittenToAndNotPutAway) {
   for (const char* device : {"/dev/full", "/dev/null"}) {
     const std::string link = path(std::string(device).substr(5));
