@@ -15,13 +15,14 @@ namespace {
 bool agreed(Console& console, const Consent& consent) {
   if (consent.yes) return true;
   if (console.options.json || isatty(STDIN_FILENO) == 0) return false;
-  fmt::print("Put these in force? [y/N] ");
-  std::fflush(stdout);
+  interrupted();  // from here on Ctrl-C is noted and does not end the prompt
+  put("Put these in force? [y/N] ");
   std::string answer;
   std::getline(std::cin, answer);
-  std::cin.clear();  // Ctrl-C ended it, and the prompt may ask again
+  std::cin.clear();  // Ctrl-C or Ctrl-D ended it, and the prompt may ask again
+  std::clearerr(stdin);
   stop_if_interrupted("Stopped; nothing was written.");
-  return answer == "y" || answer == "yes";
+  return answer == "y" || answer == "Y" || answer == "yes";
 }
 
 }  // namespace
