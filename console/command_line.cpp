@@ -84,8 +84,11 @@ int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {
   int code = 0;
   const auto failed = [&](const std::string& sentence, int exit_code) {
     code = exit_code;
-    if (console.options.json) fmt::print("{}\n", Json{{"error", sentence}, {"exit_code", exit_code}}.dump());
-    fmt::print(stderr, "{}\n", sentence);
+    // Not by what throws: standard output or error may be the reason.
+    if (console.options.json)
+      std::fputs((one_line({{"error", sentence}, {"exit_code", exit_code}}) + "\n").c_str(), stdout);
+    std::fflush(stdout);  // a program that reads answer by answer waits for it
+    std::fputs((sentence + "\n").c_str(), stderr);
   };
   try {
     parse(app);

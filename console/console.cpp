@@ -5,6 +5,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -19,7 +20,7 @@ void note(int signal) { seen_signal = signal; }
 bool install() {
   struct sigaction action {};
   action.sa_handler = note;  // no SA_RESTART: whatever waits returns
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) sigaction(signal, &action, nullptr);
   return true;
 }
 
@@ -28,7 +29,14 @@ bool install() {
 Session& Console::session() {
   if (!session_) {
     session_.emplace(options.sim ? simulated_(options) : usb().open(options.serial));
+    opened_ = options;
   }
+  const bool same_place = !options.sim || (opened_.sim && options.motor == opened_.motor);
+  const bool same_serial =
+      options.serial == opened_.serial || std::string(session_->hello().serial).rfind(options.serial, 0) == 0;
+  if (!same_place || !same_serial)
+    refuse(fmt::format("This prompt talks to {}; end it, and say --serial, --sim or --motor where hotcore is started.",
+                       session_->name()));
   return *session_;
 }
 
@@ -37,16 +45,10 @@ link::Usb& Console::usb() {
   return *usb_;
 }
 
-void Console::say(const std::string& text, const Json& json) const {
-  if (options.json)
-    fmt::print("{}\n", json.dump());
-  else
-    fmt::print("{}", text);
-  std::fflush(stdout);
-}
+void Console::say(const std::string& text, const Json& json) const { put(options.json ? one_line(json) + "\n" : text); }
 
 void Console::tell(const std::string& text) const {
-  if (!options.json) fmt::print(stderr, "{}\n", text);
+  if (!options.json) std::fputs((text + "\n").c_str(), stderr);
 }
 
 bool interrupted() {
@@ -59,6 +61,14 @@ void forget_interrupt() { seen_signal = 0; }
 void stop_if_interrupted(const std::string& state) {
   if (interrupted()) throw UserError(Exit::interrupted, state);
 }
+
+void put(const std::string& text) {
+  const bool all = std::fputs(text.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+  if (all || errno == EPIPE) return;  // of which SIGPIPE has told
+  refuse("standard output: cannot be written; the answer is not complete.");
+}
+
+std::string one_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 std::string shown(float value) { return std::isnan(value) ? "unset" : fmt::format("{:.6g}", value); }
 

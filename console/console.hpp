@@ -34,7 +34,8 @@ class Console {
 
   Options options;
 
-  /// The conversation with the chosen board, begun when first asked for.
+  /// The conversation with the chosen board, begun when first asked for. Throws UserError (usage) where it is with
+  /// another board than the options choose by now.
   Session& session();
   /// Ends it: the next session() looks for the board anew.
   void hang_up() { session_.reset(); }
@@ -49,15 +50,23 @@ class Console {
   std::function<std::unique_ptr<link::Transport>(const Options&)> simulated_;
   std::optional<link::Usb> usb_;
   std::optional<Session> session_;
+  Options opened_;  // what the session was begun with
 };
 
-/// Ctrl-C, a hang-up or a kill was seen. From the first call on they are only noted; commands look here.
+/// Writes to standard output, now. Throws UserError (usage) when it takes no more, as a full disk; a reader who left
+/// (| head) counts as Ctrl-C.
+void put(const std::string& text);
+
+/// Ctrl-C, a hang-up, a kill or a reader who left was seen. From the first call on they are only noted; commands look
+/// here.
 bool interrupted();
 /// Forgets it: the prompt goes on after an interrupted command.
 void forget_interrupt();
 /// Throws UserError (interrupted) if it was seen; `state` says how things were left.
 void stop_if_interrupted(const std::string& state);
 
+/// JSON as it is written; what is no UTF-8, as a file's name may be, is replaced.
+std::string one_line(const Json& json);
 /// A number for a person: six digits at most, "unset" for NaN.
 std::string shown(float value);
 /// The same for JSON, where NaN is null.

@@ -51,7 +51,13 @@ Armed::Armed(Session& session, std::uint8_t mask) : session_(session), mask_(mas
   session_.arm(mask_);
 }
 
+void Armed::disarm() {
+  session_.disarm(mask_);
+  ended_ = true;
+}
+
 Armed::~Armed() {
+  if (ended_) return;
   try {
     session_.disarm(mask_);
   } catch (const UserError&) {

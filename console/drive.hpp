@@ -22,12 +22,15 @@ class Armed {
  public:
   Armed(Session& session, std::uint8_t mask);
   ~Armed();
+  /// Ends it here, where that it did not work can be told: throws UserError as Session::disarm does.
+  void disarm();
   Armed(const Armed&) = delete;
   Armed& operator=(const Armed&) = delete;
 
  private:
   Session& session_;
   std::uint8_t mask_;
+  bool ended_ = false;
 };
 
 /// What a drive came to, of one axis.

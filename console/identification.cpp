@@ -111,6 +111,7 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
         course.erase(course.begin());
       }
       driven = play(course, a.turning ? turning_rad_per_s : 0);
+      armed.disarm();
     }
     recorder.finish();
   } catch (const UserError& error) {
@@ -160,7 +161,7 @@ void identify(Console& console, const Arguments& a) {
     result.update({{"changes", Json::object()}, {"written", false}, {"saved", false}});
     return console.say(fmt::format("{}Nothing was written: {}.\n", text, offered.note), result);
   }
-  if (!console.options.json) fmt::print("{}{}.\n", text, offered.note);
+  if (!console.options.json) put(text + offered.note + ".\n");
   const Outcome outcome = put_in_force(console, axis, before, offered.values, "identify found ", a.consent);
   result.update(outcome.json);
   console.say(outcome.text, result);

@@ -112,8 +112,7 @@ void Live::show(const wire::State& state, double time_s) {
     text = table(state, time_s);
     lines_ = 1;  // the header stands
   }
-  fmt::print("{}", text);
-  std::fflush(stdout);
+  put(text);
 }
 
 }  // namespace console

@@ -65,7 +65,11 @@ LogFile::LogFile(const std::string& path, const std::string& preamble, const std
   const std::string head = fmt::format("{}time_s,{}\n", preamble, fmt::join(columns, ","));
   out_.open(unfinished_, std::ios::binary);
   out_ << head << std::flush;
-  if (!out_) refuse(path + ": cannot be written; choose another folder or make room.");
+  if (!out_) {
+    std::error_code ignored;  // what was begun would be taken for another's
+    if (out_.is_open() && unfinished_ != path_) std::filesystem::remove(unfinished_, ignored);
+    refuse(path + ": cannot be written; choose another folder or make room.");
+  }
   whole_bytes_ = head.size();
 }
 

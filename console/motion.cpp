@@ -53,6 +53,7 @@ void play(Console& console, const std::string& axis, const std::vector<Piece>& p
       said = true;
       if (!console.options.json) live.show(state, time_s);
     });
+    armed.disarm();
   }
   if (axis != "both") {
     const Driven& one = driven[axis == "1" ? 1 : 0];

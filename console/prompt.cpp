@@ -102,8 +102,8 @@ int prompt(Console& console) {
     if (line == "quit" || line == "exit") break;
     if (line == "help") line = "--help";
     forget_interrupt();
-    console.options = usual;
     code = run_line(console, [&](CLI::App& app) { app.parse(line); });
+    console.options = usual;  // also for what TAB completes next
   }
   return code;
 }

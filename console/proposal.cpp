@@ -15,13 +15,14 @@ namespace {
 bool agreed(Console& console, const Consent& consent) {
   if (consent.yes) return true;
   if (console.options.json || isatty(STDIN_FILENO) == 0) return false;
-  fmt::print("Put these in force? [y/N] ");
-  std::fflush(stdout);
+  interrupted();  // from here on Ctrl-C is noted and does not end the prompt
+  put("Put these in force? [y/N] ");
   std::string answer;
   std::getline(std::cin, answer);
-  std::cin.clear();  // Ctrl-C ended it, and the prompt may ask again
+  std::cin.clear();  // Ctrl-C or Ctrl-D ended it, and the prompt may ask again
+  std::clearerr(stdin);
   stop_if_interrupted("Stopped; nothing was written.");
-  return answer == "y" || answer == "yes";
+  return answer == "y" || answer == "Y" || answer == "yes";
 }
 
 }  // namespace
@@ -57,7 +58,7 @@ Outcome put_in_force(Console& console, int axis, const Values& before, const Val
     changes[full_name(target)] = {{"before", number(old->second)}, {"found", number(value)}};
   }
   for (const Assignment& assignment : assignments) check(assignment, whose);
-  if (!console.options.json) fmt::print("{}", text);
+  if (!console.options.json) put(text);
   const bool held = assignments.empty(), written = !held && agreed(console, consent);
   const bool saved = consent.save && (held || written);
   if (written) session.set(assignments);

@@ -109,7 +109,7 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
     }
     std::string text = curves.drawn(terminal_width(), 8, in_colours());
     if (on_terminal()) {
-      if (lines > 0) fmt::print("\033[{}A\033[J", lines);
+      if (lines > 0) put(fmt::format("\033[{}A\033[J", lines));
       const TerminalSize size = terminal_size();
       const Fitted shown = fitted(text, size.columns, size.rows);
       text = shown.text, lines = shown.rows;
@@ -119,6 +119,11 @@ void watch_signals(Console& console, const std::vector<std::string>& names, doub
   session.unsubscribe();
 }
 
+/// Waits until then, or Ctrl-C.
+void wait_or_stop(Session& session, double time_s) {
+  while (!interrupted() && session.now_s() < time_s) session.wait_until(std::min(session.now_s() + 0.1, time_s));
+}
+
 void watch(Console& console, const std::vector<std::string>& names, const std::string& axis, double rate_Hz,
            double seconds) {
   if (!names.empty()) return watch_signals(console, names, rate_Hz, seconds);
@@ -126,8 +131,11 @@ void watch(Console& console, const std::vector<std::string>& names, const std::s
   Live live(axis == "both" ? 3 : axis == "1" ? 2 : 1);
   BoardTime time(session.hello().pwm_Hz);
   const double start_s = session.now_s();
-  for (double next_s = start_s; !interrupted() && next_s - start_s <= seconds; next_s += 1.0 / rate_Hz) {
-    session.wait_until(next_s);
+  // Of a rate that the board does not reach, as many as it does; none is made up for.
+  for (double next_s = start_s; next_s - start_s <= seconds;
+       next_s = std::max(next_s + 1.0 / rate_Hz, session.now_s())) {
+    wait_or_stop(session, next_s);
+    if (interrupted()) break;
     const wire::State state = session.state();
     const double time_s = time.at(state.period);
     if (console.options.json)
@@ -186,8 +194,11 @@ void capture(Console& console, const CaptureArguments& a) {
                            a.post,
                            a.decimation};
   if (!a.trigger.empty()) {
-    const Target trigger = session.signals().named(a.trigger).front();
-    order.trigger = {static_cast<std::uint8_t>(trigger.what->id), trigger.axis};
+    const std::vector<Target> triggers = session.signals().named(a.trigger);
+    if (triggers.size() > 1)
+      refuse(fmt::format("--trigger {}: one signal triggers, and this may be {} or {}; say which.", a.trigger,
+                         full_name(triggers.front()), full_name(triggers.back())));
+    order.trigger = {static_cast<std::uint8_t>(triggers.front().what->id), triggers.front().axis};
   }
   const std::size_t most_rows =
       session.hello().capture_words / (signals.size() + 1);  // one word a row is its time stamp
@@ -220,9 +231,11 @@ void capture(Console& console, const CaptureArguments& a) {
   try {
     for (int next = 0; next < status.rows;) {
       values.clear();
-      next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values);
+      std::uint32_t period = 0;
+      next += session.capture_read(static_cast<std::uint16_t>(next), static_cast<int>(signals.size()), values, period);
       for (std::size_t at = 0; at < values.size(); at += row.size()) {
-        const auto periods = static_cast<double>((file.rows() - status.pre) * status.decimation);
+        const auto periods = static_cast<std::int32_t>(period - status.trigger_period);  // wraps
+        period += status.decimation;
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(at), row.size(), row.begin());
         file.add(periods / double{session.hello().pwm_Hz}, row);
         for (std::size_t s = 0; s < row.size(); ++s) lines[s].values.push_back(row[s]);

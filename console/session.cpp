@@ -233,9 +233,10 @@ void Session::subscribe(const std::vector<Target>& signals, std::uint16_t decima
   payload.add(wire::Subscribe{decimation});
   for (const Target& signal : signals)
     payload.add(wire::SignalAddress{static_cast<std::uint8_t>(signal.what->id), signal.axis});
+  request(Kind::subscribe, payload, "send telemetry");
+  // Rows that came before the answer are of what was subscribed before.
   subscribed_ = static_cast<int>(signals.size());
   taker_ = std::move(taker);
-  request(Kind::subscribe, payload, "send telemetry");
 }
 
 void Session::unsubscribe() {
@@ -255,10 +256,11 @@ wire::CaptureStatus Session::capture_status() {
   return asked<wire::CaptureStatus>(Kind::capture_status, {}, "tell how far the capture is");
 }
 
-int Session::capture_read(std::uint16_t first, int signals, std::vector<float>& values) {
+int Session::capture_read(std::uint16_t first, int signals, std::vector<float>& values, std::uint32_t& period) {
   const wire::Frame& frame = request(Kind::capture_read, bytes_of(wire::Index{first}), "hand over the capture");
   const auto view = link::rows_in(frame, wire::reply_to(Kind::capture_read), signals);
   if (!view || view->head.rows == 0) misread("hand over the capture");
+  period = view->head.first_period;
   for (std::size_t r = 0; r < view->head.rows; ++r) {
     for (std::size_t s = 0; s < static_cast<std::size_t>(signals); ++s) values.push_back(view->value(r, s));
   }

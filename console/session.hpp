@@ -60,8 +60,9 @@ class Session {
 
   void capture(const wire::CaptureOrder& order, const std::vector<Target>& signals);
   wire::CaptureStatus capture_status();
-  /// Appends the rows from `first` on that fit one answer, `signals` values each; returns how many.
-  int capture_read(std::uint16_t first, int signals, std::vector<float>& values);
+  /// Appends the rows from `first` on that fit one answer, `signals` values each; returns how many. They follow each
+  /// other without a gap from `period` on.
+  int capture_read(std::uint16_t first, int signals, std::vector<float>& values, std::uint32_t& period);
 
   double now_s() const { return board_.now_s(); }
   /// Lets telemetry come in until then.

@@ -315,6 +315,10 @@ Seen& choose(std::vector<Seen>& boards, const std::string& prefix) {
     throw UserError(Exit::no_board, fmt::format("No board's serial begins with '{}'; there are: {}.", prefix,
                                                 fmt::join(serials, ", ")));
   }
+  // Another board's serial may begin with the whole of the one that is meant.
+  const auto meant = [&](const Seen* seen) { return !prefix.empty() && seen->found.serial == prefix; };
+  if (std::count_if(fitting.begin(), fitting.end(), meant) == 1)
+    fitting = {*std::find_if(fitting.begin(), fitting.end(), meant)};
   if (fitting.size() > 1) {
     std::vector<std::string> names;
     for (const Seen* seen : fitting)

@@ -166,6 +166,14 @@ TEST_F(Commands, RunArmsPlaysAndDisarms) {
   refused("run \"5A 1s\" --times 0", 2, "it may be 1 to 1000");
 }
 
+TEST_F(Commands, ABoardThatDoesNotAnswerADisarmIsNotCalledDisarmed) {
+  board_->before = [](Kind kind) { return kind != Kind::disarm; };
+  const Said said = say("run \"1A 0.1s\"");
+  EXPECT_EQ(said.code, 7);
+  EXPECT_NE(said.err.find("no answer when asked to disarm axis 0"), std::string::npos) << said.err;
+  EXPECT_EQ(said.out.find("Done"), std::string::npos) << said.out;
+}
+
 TEST_F(Commands, NoTemperatureIsToldThatTheBoardDidNotSay) {
   for (const std::string line : {"arm --seconds 0", "run \"1A 0.0000001ms\""}) {
     const auto shortest = json(line);
@@ -341,6 +349,47 @@ TEST_F(Commands, WatchGivesALineForEachState) {
   EXPECT_NE(curves.out.find("axis0.iq_A 22"), std::string::npos) << curves.out;
 }
 
+TEST_F(Commands, AWatchEndsWhenItShouldThoughTheBoardIsSlowerThanItsRate) {
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::state) board_->pass(0.01);
+    return true;
+  };
+  const Said said = say("watch --json --rate 1000 --seconds 1");
+  EXPECT_EQ(said.code, 0) << said.err;
+  EXPECT_LT(board_->now_s, 1.1);
+  const auto states = std::count(said.out.begin(), said.out.end(), '\n');
+  EXPECT_TRUE(states > 90 && states < 105) << states;
+}
+
+TEST_F(Commands, CtrlCEndsAWatchThatWaitsForItsNextState) {
+  board_->passing = [&] {
+    if (board_->now_s > 5) std::raise(SIGINT);
+  };
+  console::interrupted();  // from here on noted only
+  EXPECT_EQ(say("watch --json --rate 0.01").code, 0);
+  console::forget_interrupt();
+  EXPECT_LT(board_->now_s, 6);
+}
+
+TEST_F(Commands, RowsOfAnEarlierSubscriptionStayOutOfALog) {
+  ASSERT_EQ(say("log axis0.iq_A --out " + path("a.csv") + " --seconds 0.1 --rate 1000").code, 0);
+  // One that was broken off left its telemetry on; some of it is under way while the next one is ordered.
+  int orders = 0;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::subscribe && ++orders == 2) board_->unplugged = true;
+    return true;
+  };
+  EXPECT_EQ(say("log axis0.iq_A --out " + path("b.csv") + " --seconds 0.1 --rate 1000").code, 7);
+  board_->unplugged = false;
+  board_->before = [&](Kind kind) {
+    if (kind == Kind::subscribe) board_->pass(0.01);
+    return true;
+  };
+  board_->to_pc.clear();
+  ASSERT_EQ(say("log axis0.bus_V --out " + path("c.csv") + " --seconds 0.1 --rate 100").code, 0);
+  EXPECT_EQ(content(path("c.csv")).find(",22\n"), std::string::npos) << content(path("c.csv"));  // iq_A
+}
+
 TEST_F(Commands, LogHasUnitsAPreambleAndIdentifysNames) {
   const auto said = json("log --out " + path("x.csv") + " --seconds 2 --rate 50");
   EXPECT_NEAR(said["rows"], 101, 1);
@@ -368,6 +417,21 @@ TEST_F(Commands, CaptureWritesRowsAroundItsTrigger) {
   const std::string text = content(path("c.csv"));
   EXPECT_NE(text.find("\n-0.001500,0,0\n"), std::string::npos) << text;
   EXPECT_NE(text.find("\n0.003450,99,99\n"), std::string::npos);
+}
+
+TEST_F(Commands, PeriodsThatABoardLostAreTimeInItsCapture) {
+  board_->lost_periods = 2000;  // 0.1 s
+  ASSERT_EQ(say("capture axis0.iq_A --pre 30 --post 400 --out " + path("c.csv")).code, 0);
+  const std::string text = content(path("c.csv"));
+  EXPECT_NE(text.find("\n-0.001500,0\n"), std::string::npos) << text;  // as without a gap
+  EXPECT_NE(text.find("\n0.000000,30\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n0.119950,429\n"), std::string::npos) << text;
+}
+
+TEST_F(Commands, ATriggerIsOneSignal) {
+  refused("capture axis1.iq_A --trigger iq_A --edge rising --out " + path("c.csv"), 2,
+          "this may be axis0.iq_A or axis1.iq_A; say which");
+  EXPECT_TRUE(is_empty());
 }
 
 TEST_F(Commands, TheListNamesTheSimulatedBoard) { EXPECT_EQ(json("list")[0]["serial"], "FAKE01"); }
@@ -489,6 +553,22 @@ TEST_F(Commands, AFullDiskEndsALogAtOnceAndLeavesWholeRows) {
                           std::to_string(rows) + " rows until then.\n"),
             std::string::npos)
       << said.err << rows;
+}
+
+TEST_F(Commands, ADiskThatIsFullFromTheStartLeavesNoFile) {
+  rlimit usual{};
+  getrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_IGN);
+  board_->before = [&](Kind kind) {
+    rlimit full = usual;
+    if (kind == Kind::get) full.rlim_cur = 10, setrlimit(RLIMIT_FSIZE, &full);  // the preamble's
+    return true;
+  };
+  const int code = console::run_line(console_, [&](CLI::App& app) { app.parse("--sim log --out " + path("x.csv")); });
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(code, 2);
+  EXPECT_TRUE(is_empty());  // no .part either: the next log would take it for another's
 }
 
 TEST_F(Commands, ADeviceIsWrittenToAndNotPutAway) {
@@ -694,6 +774,22 @@ TEST_F(Commands, WithJsonAnErrorIsJsonToo) {
 
 // ---- small parts
 // ------------------------------------------------------------------------------------------------------
+
+TEST_F(Commands, WithJsonWhatIsNoUtf8IsReplacedAndEndsNothing) {
+  const Said said = say("--json get \xE4");
+  EXPECT_EQ(said.code, 2);
+  EXPECT_EQ(nlohmann::json::parse(said.out, nullptr, false)["exit_code"], 2) << said.out;
+  EXPECT_TRUE(json("backup " + path("\xE4.toml")).contains("written"));
+}
+
+TEST_F(Commands, ACommandForAnotherBoardIsNotObeyedByThisOne) {
+  ASSERT_EQ(say("stop").code, 0);
+  EXPECT_EQ(say("stop --serial FAKE").code, 0);  // this one
+  refused("run \"1A 0.1s\" --serial OTHER", 2, "This prompt talks to fake FAKE01; end it");
+  console_.options.serial.clear();
+  EXPECT_EQ(console::run_line(console_, [&](CLI::App& app) { app.parse("run \"1A 0.1s\" --motor other --sim"); }), 2);
+  EXPECT_EQ(board_->setpoints, 0);
+}
 
 TEST(Profile, UnitsAreUnderstood) {
   const auto pieces = console::profile_in("20A 0.3s, -500mA 200 ms,6 2min", 10);

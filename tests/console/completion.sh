@@ -37,6 +37,14 @@ said=$(printf 'get axis1.pole\t\nquit\n' | typed "$hotcore --sim")
 check "TAB at the prompt" "$(grep -o '^axis1.pole_pairs  *1 ' <<<"$said" | tr -s ' ')" "axis1.pole_pairs 1 "
 said=$(typed "$hotcore --serial NOBODY")
 check "the prompt without a board: exit code 4, one line" "$? $(wc -l <<<"$said") ${said:0:8}" "4 1 No board"
+said=$(printf 'Y\n' | typed "$hotcore --sim motor ec-powermax-30-24v --supply 24")
+check "a yes in capitals" "$(grep -o 'In force' <<<"$said")" "In force"
+told() { printf '%s' "$1" && sleep 1; } # once the question is there
+for key in $'\003' $'\004'; do
+  motor=$'motor ec-powermax-30-24v --supply 24\n'
+  said=$({ told "$motor" && told "$key" && told "$motor" && told $'y\n' && told $'quit\n'; } | typed "$hotcore --sim")
+  check "$(cat -v <<<"$key") ends a question and not the next one" "$(grep -o 'In force' <<<"$said")" "In force"
+done
 
 # paragraph COMMAND: what the manual says of it.
 paragraph() { sed 's/\\-/-/g; s/\\f.//g' "$manual" | awk -v c="$1" '/^\.TP/ { on = 0; getline; on = $2 == c } on'; }

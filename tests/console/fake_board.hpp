@@ -50,12 +50,15 @@ struct FakeBoard {
   std::uint8_t fault = 0;
   float temperature_degC = 30.0f;
   std::uint8_t axis1_limit = 0;
+  std::uint32_t lost_periods = 0;  // of a capture, between its first answer and the second
   wire::FaultEvidence evidence{};
   wire::Outlook standing{{}, 0, {}, 171.0f, 0.21f, 0.8f}, turning{{}, 1, {}, 98.0f, INFINITY, 1.0f};
   float enough_rest_s = INFINITY;     // before a course, for any
   std::vector<wire::Segment> course;  // last
   /// Sees each request before it is answered; false: no answer comes.
   std::function<bool(wire::Kind)> before = [](wire::Kind) { return true; };
+  /// Sees time pass.
+  std::function<void()> passing = [] {};
   /// May change an answer's payload before it is framed.
   std::function<void(wire::Kind, std::vector<std::uint8_t>&)> twist = [](wire::Kind, std::vector<std::uint8_t>&) {};
 
@@ -82,6 +85,7 @@ struct FakeBoard {
   }
   void pass(double seconds) {
     now_s += seconds;
+    passing();
     while (!watched_.empty() && next_row_s_ <= now_s) push_row();
   }
 
@@ -293,18 +297,20 @@ struct FakeBoard {
                                          static_cast<std::uint16_t>(order_.pre + order_.post),
                                          order_.pre,
                                          order_.decimation,
-                                         1000});
+                                         trigger_period});
         break;
       case wire::Kind::capture_read: {
         const int first = mask | frame.payload[1] << 8,
                   fit = static_cast<int>(wire::max_row_values) / std::max(1, captured_);
         const int rows = std::clamp(order_.pre + order_.post - first, 0, fit);
-        add(payload, wire::Rows{{},
-                                0,
-                                static_cast<std::uint32_t>(first),
-                                1,
-                                static_cast<std::uint8_t>(captured_),
-                                static_cast<std::uint8_t>(rows)});
+        const int since_trigger = (first - order_.pre) * order_.decimation;
+        add(payload,
+            wire::Rows{{},
+                       trigger_period + static_cast<std::uint32_t>(since_trigger) + (first > 0 ? lost_periods : 0),
+                       0,
+                       order_.decimation,
+                       static_cast<std::uint8_t>(captured_),
+                       static_cast<std::uint8_t>(rows)});
         for (int i = 0; i < rows * captured_; ++i) add(payload, static_cast<float>(first + i / captured_));
         break;
       }
@@ -321,6 +327,8 @@ struct FakeBoard {
     if (held_.kind == wire::reply_to(kind)) send(held_.kind, held_.sequence, held_.payload);
     send(wire::reply_to(kind), frame.sequence, payload);
   }
+
+  static constexpr std::uint32_t trigger_period = 20;  // as if the counter had wrapped a moment ago
 
   struct Held {
     std::uint8_t kind = 0, sequence = 0;

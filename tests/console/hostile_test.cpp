@@ -64,7 +64,8 @@ std::vector<std::vector<std::uint8_t>> honest_answers() {
   session.capture({{}, wire::Edge::now, 0, 0, 5, 5, 1}, session.signals().all());
   (void)session.capture_status();
   std::vector<float> values;
-  (void)session.capture_read(0, static_cast<int>(session.signals().all().size()), values);
+  std::uint32_t period = 0;
+  (void)session.capture_read(0, static_cast<int>(session.signals().all().size()), values, period);
   session.subscribe(session.signals().all(), 20, [](const console::link::RowsView&) {});
   session.wait_until(session.now_s() + 0.01);
   return answers;

@@ -321,11 +321,12 @@ int main(int argc, char** argv) {
     all.push_back(std::make_unique<MockedBoard>(options, faults));
     UMockdevIoctlBase* handler = umockdev_ioctl_base_new();
     g_signal_connect(handler, "handle-ioctl", G_CALLBACK(on_ioctl), all.back().get());
-    const std::string number = std::to_string(i + 2), node = "bus/usb/001/00" + number;
+    const std::string number = std::to_string(i + 2), three = std::string(3 - number.size(), '0') + number;
+    const std::string node = "bus/usb/001/" + three;
     GError* error = nullptr;
     const std::string device =
         "P: /devices/usb1/1-" + std::to_string(i + 1) + "\nN: " + node +
-        "\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=00" + number + "\nE: DEVNAME=/dev/" + node +
+        "\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=" + three + "\nE: DEVNAME=/dev/" + node +
         "\nE: DEVTYPE=usb_device\nA: busnum=1\\n\nA: devnum=" + number +
         "\\n\nA: bConfigurationValue=1\\n\nA: speed=12\\n\nH: descriptors=" + all.back()->descriptors() + "\n\n";
     if (!umockdev_testbed_attach_ioctl(testbed, ("/dev/" + node).c_str(), handler, &error) ||

@@ -26,6 +26,7 @@ on_bus(two_boards 4 "2 boards are plugged in .SIM0, SIM1.; choose one" "--boards
 on_bus(two_with_one_prefix 4 "2 boards have a serial that begins with 'SIM'" "--boards 2" --serial SIM get)
 on_bus(none_with_prefix 4 "No board's serial begins with 'X'; there are: SIM0, SIM1" "--boards 2" --serial X get)
 on_bus(one_of_two 0 "current_limit_A" "--boards 2" --serial SIM1 get current_limit_A)
+on_bus(one_whose_serial_begins_anothers 0 "current_limit_A" "--boards 11" --serial SIM1 get current_limit_A)
 on_bus(busy 6 "another program holds the board" "--busy" get)
 on_bus(gone_while_backing_up 7 "unplugged when asked to describe parameter" "--unplug-after 20" backup half.toml)
 on_bus(gone_while_saving 7 "unplugged when asked to save" "--unplug-after 1" save)

@@ -51,7 +51,13 @@ expect(prompt 0 "20 -> 7.*current_limit_A +7.*Done in 0.1" ${sim})
 set(typed "mode torque --axis 1\nrun \"20mNm 0.1s\" --axis 1\nrun \"3A 0.1s\"\nmode\nquit\n")
 # 3/2 pole pairs flux linkage of this motor: 6.5 mN m/A, so 3.1 A.
 expect(prompt_in_torque_mode 0 "axis 1: torque mode, setpoints in N m.*1    ready   torque .*Done in 0.1[0-9]* s and disarmed: peak current 3.[1-3] A.*Done in 0.1.*axis 0: current mode.*axis 1: torque mode" ${sim})
+set(typed "get axis0.pole_pairs\nrun \"3A 0.1s\" --serial OTHER\nquit\n")
+expect(prompt_asked_for_another_board 2 "axis0.pole_pairs.*This prompt talks to .*SIM0; end it" ${sim})
 set(typed "")
+expect(standard_output_that_is_full 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim get > /dev/full")
+expect(a_full_disk_ends_a_run 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim run '1A 60s' > /dev/full")
+expect(a_reader_who_leaves_disarms 0 "Stopped and disarmed.*ended with 130" sh -c "(${HOTCORE} --sim run '1A 60s' || echo ended with $? >&2) | head -n 1")
+expect(nobody_reads_the_errors 0 "ended with 2" sh -c "${HOTCORE} --sim get nothing 2>/dev/full || echo ended with $?")
 expect(identification 0 "axis0.R2_K_per_W +16.3 -> 1[567].*In force until" ${sim} identify --minutes 6 --out found --ambient 25 --yes)
 expect(identification_of_an_unknown_room 0 "left out, since it takes the motor for cooler and nobody told how warm the room was .--ambient DEGC.: R2_K_per_W.*Nothing to write" ${sim} identify --minutes 6 --out cold --yes)
 # A board that takes its winding for much cooler than it is; its true R1 is 1.08 K/W, C1 1.13 J/K.
