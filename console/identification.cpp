@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 #include "console/commands.hpp"
@@ -49,7 +50,8 @@ void run_identify(std::vector<std::string> arguments, const std::string& json, b
   if (child > 0 && WIFSIGNALED(status))
     refuse_data(fmt::format("identify was killed by signal {}; the log is kept, run it by hand.", WTERMSIG(status)));
   const int code = child > 0 ? WEXITSTATUS(status) : 127;
-  if (code == 127) refuse_data("The program identify was not found; build it or put it beside hotcore.");
+  if (code == 127)
+    refuse_data("The program identify was not found; put it beside hotcore or run it by hand, the log is kept.");
   if (code != 0 && !std::filesystem::exists(json))
     refuse_data("identify could not use the log; its sentence stands above, the log is kept.");
 }
@@ -71,18 +73,26 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
   const auto mask = static_cast<std::uint8_t>(1 << axis);
   const double whole_A = course_A(before);
   std::vector<Piece> course = designed_course(whole_A, a.minutes);
-  double length_s = 0, told_s = -1e9;
-  for (const Piece& piece : course) length_s += double{piece.seconds};
+  const std::vector<Piece> cold = cold_course(before), rest = {{0, 2}};
+  const auto length_s = [](const std::vector<Piece>& pieces) {
+    return std::accumulate(pieces.begin(), pieces.end(), 0.0,
+                           [](double s, const Piece& piece) { return s + double{piece.seconds}; });
+  };
+  const double whole_s = length_s(course) + (a.turning ? length_s(cold) + length_s(rest) : 0);
+  double played_s = 0, told_s = -1e9;
   const auto look = [&](const wire::State& state, double time_s) {
-    if (time_s - told_s < length_s / 10) return;
-    told_s = time_s;
-    console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed", 100 * time_s / length_s,
+    const double at_s = played_s + time_s;
+    if (at_s - told_s < whole_s / 10) return;
+    told_s = at_s;
+    console.tell(fmt::format("  {:3.0f} %   core {:.1f} degC, {:.1f} A of {:.1f} A allowed", 100 * at_s / whole_s,
                              state.axis[axis].core_degC, std::hypot(state.axis[axis].id_A, state.axis[axis].iq_A),
                              state.axis[axis].allowance_A));
   };
   const auto play = [&](const std::vector<Piece>& pieces, float electrical_rad_per_s) {
-    return drive(session, mask, pieces, Along::d, look,
-                 electrical_rad_per_s / before.at("pole_pairs"))[static_cast<std::size_t>(axis)];
+    const Driven driven = drive(session, mask, pieces, Along::d, look,
+                                electrical_rad_per_s / before.at("pole_pairs"))[static_cast<std::size_t>(axis)];
+    played_s += length_s(pieces);
+    return driven;
   };
 
   const std::string what = fmt::format("axis {}, designed course for identification", axis);
@@ -99,9 +109,9 @@ Driven record(Console& console, int axis, const Values& before, const Arguments&
     {
       Armed armed(session, mask);
       if (a.turning) {
-        play(cold_course(before), turning_rad_per_s);
+        play(cold, turning_rad_per_s);
         // At rest, as the log has to begin.
-        play({{0, 2}}, 0);
+        play(rest, 0);
         if (!winding.begin())
           console.tell(
               fmt::format("The winding cannot be read: {:.1f} and {:.1f} A did not flow, or --leads is too much; is "
