@@ -19,6 +19,7 @@ constexpr const char* examples =
     "  hotcore --sim run \"20A 20ms, -20A 40ms, 20A 20ms\" --times 40   shaken until heat limits it\n"
     "  hotcore set axis0.current_limit_A=12 --save   ranges and meanings: hotcore get\n"
     "  hotcore motor ec-16-40w --supply 48           tell axis 0 the sheet of its motor\n"
+    "  hotcore align                                 find its angle_offset; the shaft turns\n"
     "  hotcore backup mine.toml                      all parameters into a file\n"
     "  hotcore log --out run.csv --seconds 60        a log that identify reads as it is\n"
     "  hotcore fault                                 what happened, the evidence, what to do\n"
@@ -73,6 +74,7 @@ void add_commands(CLI::App& app, Console& console) {
   add_records(app, console);
   add_identify(app, console);
   add_motor(app, console);
+  add_align(app, console);
 }
 
 int run_line(Console& console, const std::function<void(CLI::App&)>& parse) {

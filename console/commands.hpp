@@ -16,6 +16,7 @@ void add_parameters(CLI::App& app, Console& console);  // get, set, save, diff, 
 void add_motion(CLI::App& app, Console& console);      // arm, mode, run, stop, calibrate, fault, ask    motion.cpp
 void add_records(CLI::App& app, Console& console);     // signals, watch, log, capture                   records.cpp
 void add_identify(CLI::App& app, Console& console);    // identify                                   identification.cpp
+void add_align(CLI::App& app, Console& console);       // align                                           align.cpp
 void add_motor(CLI::App& app, Console& console);       // motor, model                                   motor.cpp
 
 /// For options: a number outside, NaN too, is refused with the range.

@@ -78,6 +78,13 @@ std::string fault_sentence(const wire::FaultEvidence& evidence) {
   return sentence;
 }
 
+void clear_fault(Session& session, std::uint8_t mask) {
+  const wire::State now = session.state();
+  // Only a zero setpoint may stand when a fault is cleared.
+  session.exchange({mask, {now.axis[0].control, now.axis[1].control}, 0, {0, 0}, {0, 0}});
+  session.clear(mask);
+}
+
 void need_mode(Console& console, std::uint8_t mask, wire::ControlMode mode) {
   const wire::State state = console.session().state();
   for (int a = 0; a < wire::axis_count; ++a) {

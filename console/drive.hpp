@@ -56,5 +56,7 @@ std::array<Driven, wire::axis_count> drive(Session& session, std::uint8_t mask, 
 
 /// The sentence of a fault: what happened, evidence, advice. Empty for none.
 std::string fault_sentence(const wire::FaultEvidence& evidence);
+/// Forgets the faults of these axes, which are off then.
+void clear_fault(Session& session, std::uint8_t mask);
 
 }  // namespace console

@@ -121,10 +121,7 @@ void fault(Console& console, const std::string& axis, bool clear) {
                                       {"advice", code.advice}};
     if (!clear || evidence.fault == 0) continue;
     const auto one = static_cast<std::uint8_t>(1 << a);
-    const wire::State now = console.session().state();
-    // Only a zero setpoint may stand when a fault is cleared.
-    console.session().exchange({one, {now.axis[0].control, now.axis[1].control}, 0, {0, 0}, {0, 0}});
-    console.session().clear(one);
+    clear_fault(console.session(), one);
     text += "        cleared; the axis is off.\n";
     json[fmt::format("axis{}", a)]["cleared"] = true;
   }

@@ -44,7 +44,7 @@ void take_sheet(Console& console, const MotorArguments& a) {
   else if (const auto at = before.find("angle_offset_rad"); at != before.end() && std::isnan(at->second))
     refuse(
         fmt::format("axis{}.angle_offset_rad is unset: say what the encoder reads when the magnet lies on phase a, "
-                    "--angle-offset RAD (electrical).",
+                    "--angle-offset RAD (electrical), or 0 and then let 'hotcore align' find it.",
                     axis));
   for (const auto& [name, value] : proposed) {
     if (!before.contains(name))

@@ -163,6 +163,7 @@ class Axis {
 
   /// Live: as of the last tick.
   Mode mode() const { return mode_; }
+  bool sees() const { return sees_; }  // the last sample was admitted
   FastView fast() const;
   FaultRecord fault() const;
   /// Where a signal of axis.signals lies; empty if there is no such id.
@@ -267,7 +268,7 @@ class Axis {
   wire::ControlMode control_ = wire::ControlMode::current;  // of the lower context; the fast lane knows current only
   float A_per_Nm_ = unset;
   bool configured_ = false;             // the parameter set is complete and valid
-  bool sees_ = false;                   // the last sample was admitted
+  bool sees_ = false;
   float quiet_rad_per_s_per_V_ = 0.0f;  // below it the back-EMF cannot push current through the diodes
   float offset_bound_A_ = 0.0f;
 

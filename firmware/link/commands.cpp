@@ -279,7 +279,7 @@ wire::State Commands::state() const {
     const Axis& axis = driver_.axis(i);
     const FastView fast = axis.fast();
     const AxisState& slow = axis.state();
-    now.bus_V = fast.bus_V;
+    if (i == 0 || axis.sees()) now.bus_V = fast.bus_V;  // one bus: an axis that sees nothing tells of another time
     wire::AxisReport& report = now.axis[i];
     report.mode = static_cast<std::uint8_t>(axis.mode());
     report.limit = static_cast<std::uint8_t>(fast.limit);

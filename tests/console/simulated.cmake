@@ -28,6 +28,9 @@ expect(mode 0 "axis 0: current mode, setpoints in A.*axis 1: current mode" ${sim
 expect(run_in_the_wrong_mode 8 "^Axis 0 is in current mode and takes no N m.*'mode torque --axis 0' at the prompt" ${sim} run "20mNm 0.3s")
 expect(arm_beyond_any_board 8 "^Axis 0 refused the setpoint 1e.09 A: .*beyond any board" ${sim} arm --iq 1e9)
 expect(allowance_for_a_second 0 "\"time_left_s\":null,\"allowance_1s_A\":[1-9]" ${sim} --json watch --seconds 3 --rate 1)
+# On this board the magnet lies on phase a where the encoder reads 0.
+expect(align 0 "Found to .-0.0.*axis1.angle_offset_rad +0 -> -?0.0[0-5]" ${sim} align --axis 1)
+expect(align_what_friction_holds 3 "does not answer 0.02 A: is it free" ${sim} align --current 0.02)
 expect(stop 0 "Disarmed: both axes" ${sim} stop)
 expect(calibrate 0 "axis 1: the current sensors' offsets are" ${sim} calibrate)
 expect(fault 0 "axis 0: no fault" ${sim} fault)
@@ -53,6 +56,8 @@ set(typed "mode torque --axis 1\nrun \"20mNm 0.1s\" --axis 1\nrun \"3A 0.1s\"\nm
 expect(prompt_in_torque_mode 0 "axis 1: torque mode, setpoints in N m.*1    ready   torque .*Done in 0.1[0-9]* s and disarmed: peak current 3.[1-3] A.*Done in 0.1.*axis 0: current mode.*axis 1: torque mode" ${sim})
 set(typed "get axis0.pole_pairs\nrun \"3A 0.1s\" --serial OTHER\nquit\n")
 expect(prompt_asked_for_another_board 2 "axis0.pole_pairs.*This prompt talks to .*SIM0; end it" ${sim})
+set(typed "set axis0.angle_offset_rad=2\nalign --yes\nset axis0.pole_pairs=3\nalign\nget axis0.angle_offset_rad\nquit\n")
+expect(prompt_aligns 0 "angle_offset_rad +2 -> -?0.0[0-5].*axis0.angle_offset_rad +-?0.0[0-5].*magnet makes 1 electrical turns in one of the shaft, and axis0.pole_pairs is 3" ${sim})
 set(typed "")
 expect(standard_output_that_is_full 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim get > /dev/full")
 expect(a_full_disk_ends_a_run 2 "standard output: cannot be written" sh -c "${HOTCORE} --sim run '1A 60s' > /dev/full")
