@@ -12,6 +12,9 @@
 namespace image_tests {
 namespace {
 
+using host_sim::Channel;
+using host_sim::FaultKind;
+
 /// The cable as the console sees it, at the board's own time.
 class Transport : public console::link::Transport {
  public:
@@ -55,34 +58,56 @@ class Transport : public console::link::Transport {
   std::deque<std::uint8_t> arrived_;
 };
 
-/// What the board's axis 0 then believes; NaN where the command did not end with 0.
-float offset_after(Plugged& plugged, const std::string& command) {
-  console::Console console([&](const console::Options&) { return std::make_unique<Transport>(plugged); });
-  console.options.sim = true;  // and not what hangs on this PC's USB
-  if (console::run_line(console, [&](CLI::App& app) { app.parse(command); }) != 0) return NAN;
-  return console.session().get(console.session().parameters().named("axis0.angle_offset_rad")).front();
-}
+/// Shafts that turn freely and have not met their index; the board believes it where the magnet is `told_rad` off.
+struct Fresh : Plugged {
+  explicit Fresh(float told_rad, bool reversed = false) : Plugged(free_shafts()) {
+    firmware::AxisSet setup[2];
+    setup_of(free_shafts(), setup);
+    for (auto& s : setup) s.drive.angle_offset_rad = told_rad;
+    pcb->flash_parameters(setup);
+    if (reversed) pcb->bench.faults().add({.channel = Channel::encoder, .kind = FaultKind::gain, .value = -1});
+    pcb->bench.motor(0).place(2.0, 0);  // the other stands on its index, which the switches may contradict
+    pcb->power_on(1);
+    EXPECT_TRUE(configure());
+    std::vector<Transfer> none;
+    while (host.time_s() < 0.6) host.turn(none);  // the current sensors' offset is learnt
+  }
+  int say(const std::string& command) {
+    return console::run_line(console, [&](CLI::App& app) { app.parse(command); });
+  }
+  float offset_rad() {
+    return console.session().get(console.session().parameters().named("axis0.angle_offset_rad")).front();
+  }
+  static Options free_shafts() {
+    Options o;
+    o.locked = false;
+    return o;
+  }
+
+  console::Console console{[this](const console::Options&) { return std::make_unique<Transport>(*this); }};
+};
 
 // Switches are mounted to the magnet; the bench's index is where the magnet lies on phase a, which makes the offset 0.
 TEST(SlowConsole, AlignsAShaftWhoseIndexWasNotMetYet) {
   NEEDS_IMAGE(image);
   for (const float told_rad : {0.6f, 2.5f, -2.0f}) {
     SCOPED_TRACE(told_rad);
-    Options o;
-    o.locked = false;
-    Plugged p(o);
-    firmware::AxisSet setup[2];
-    setup_of(o, setup);
-    for (auto& s : setup) s.drive.angle_offset_rad = told_rad;
-    p.pcb->flash_parameters(setup);
-    p.pcb->bench.motor(0).place(2.0, 0);  // the other stands on its index, which the switches may contradict
-    p.pcb->power_on(1);
-    ASSERT_TRUE(p.configure());
-    std::vector<Transfer> none;
-    while (p.host.time_s() < 0.6) p.host.turn(none);  // the current sensors' offset is learnt
-    EXPECT_NEAR(offset_after(p, "align --yes"), 0.0f, 0.06f);
-    NO_TROUBLE_ON_USB(p);
+    Fresh board(told_rad);
+    EXPECT_EQ(board.say("align --sim --yes"), 0);
+    EXPECT_NEAR(board.offset_rad(), 0.0f, 0.06f);
+    NO_TROUBLE_ON_USB(board);
   }
+}
+
+TEST(SlowConsole, AnEncoderThatCountsAgainstThePhasesIsNamedAndNothingWritten) {
+  NEEDS_IMAGE(image);
+  Fresh board(0.6f, true);
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(board.say("align --sim --yes"), 3);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("counts against the phases; swap two of the motor's leads"), std::string::npos) << said;
+  EXPECT_EQ(board.offset_rad(), 0.6f);
+  NO_TROUBLE_ON_USB(board);
 }
 
 }  // namespace
