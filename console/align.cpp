@@ -27,7 +27,7 @@ constexpr double longest_turn_s = 30;
 constexpr double first_push_s = 0.02, longest_push_s = 0.3, rest_s = 0.05;
 constexpr double learn_s = 0.5;  // more than twice what a board needs to learn its current sensors' offsets
 constexpr double first_share = 0.05, louder = 1.5;  // of the most that may flow
-// Back-EMF of the magnet where it is not believed to be: twice this is half of what firmware/watch.hpp lets pass.
+// Back-EMF of the magnet where it is not believed to be: twice this is less than firmware/watch.hpp lets pass.
 constexpr double most_of_bus = 0.01;
 
 struct AlignArguments {
