@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -62,6 +63,29 @@ std::string from_latin_1(std::string_view text) {
       out += c;
     else
       out += {static_cast<char>(0xC0 | code >> 6), static_cast<char>(0x80 | (code & 0x3F))};
+  }
+  return out;
+}
+
+/// What spreadsheets call Unicode text, and a Windows shell writes: pairs of bytes, in the order of the mark that they
+/// begin with.
+std::string from_utf_16(std::string_view text) {
+  const bool low_first = text.starts_with("\xFF\xFE");
+  const auto unit = [&](std::size_t at) {
+    const auto first = static_cast<unsigned char>(text[at]), second = static_cast<unsigned char>(text[at + 1]);
+    return static_cast<std::uint32_t>(low_first ? second << 8 | first : first << 8 | second);
+  };
+  std::string out;
+  for (std::size_t at = 0; at + 1 < text.size(); at += 2) {
+    std::uint32_t code = unit(at);
+    if (code >= 0xD800 && code < 0xDC00 && at + 3 < text.size()) {  // of two pairs
+      at += 2;
+      code = 0x10000 + ((code & 0x3FF) << 10 | (unit(at) & 0x3FF));
+    }
+    const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;  // bytes behind the first
+    constexpr int marks[] = {0, 0xC0, 0xE0, 0xF0};
+    out += static_cast<char>(marks[more] | code >> 6 * more);
+    for (int k = more - 1; k >= 0; --k) out += static_cast<char>(0x80 | (code >> 6 * k & 0x3F));
   }
   return out;
 }
@@ -418,8 +442,7 @@ Table read_table(const std::string& path) {
   std::string text = whole_file(path);
   Table table;
   table.file = path;
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
-    refuse_line(table, 1, "the file is UTF-16; save it as UTF-8 text.");
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) text = from_utf_16(text);
   if (!is_utf8(text)) text = from_latin_1(text);
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');  // old Macintosh's
   if (text.starts_with("version https://git-lfs"))
