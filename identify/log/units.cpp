@@ -72,6 +72,7 @@ const std::map<std::string, std::string>& spellings() {
       {"turn/s", "rev/s"},   {"turns/s", "rev/s"}, {"hz", "Hz"},                      // as programs write
       {"℃", "degC"},         {"℉", "degF"},        {"µs", "us"},     {"μs", "us"},    // the sign micro, the letter mu
       {"Ω", "ohm"},          {"mΩ", "mohm"},       {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter, the sign ohm
+      {"nmm", "mNm"},        {"n.mm", "mNm"},      {"n·mm", "mNm"},  {"rad.s-1", "rad/s"},
   };
   return table;
 }
