@@ -83,7 +83,7 @@ bool of_the_supply(const std::string& name) {
 /// quantity (current_temperature is no current, and StatorCurrent no stator's temperature).
 bool is_none(const std::string& name, Role role) {
   const bool temperature = has_any(name, {"temp", "degc", "\u00b0c"});
-  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan"});
+  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan", "gps"});
   if (role == Role::current)
     return temperature || of_the_supply(name) ||
            has_any(name, {"charge", "hour", "state", "mode", "pos", "angle", "speed", "vel", "rpm", "time", "volt",
@@ -104,10 +104,10 @@ bool of_the_motor(const std::string& name) {
                         "current_q"});
 }
 
-/// What was asked for, beside what is: Iq_setpoint and Iq_measured.
+/// What was asked for, beside what is, or counts beside what they are worth: Iq_setpoint and current_raw, Iq_measured.
 bool is_commanded(const std::string& name) {
-  return has_any(
-      name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max", "error"});
+  return has_any(name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max",
+                        "error", "raw", "adc"});
 }
 
 /// esc[0].motor_temp: esc, 0, motor, temp.
@@ -194,7 +194,7 @@ const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung
 /// Columns that nothing needs, and that would tell more; `what` each is.
 std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
   const std::pair<std::vector<Likely>, const char*> useful[] = {
-      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "motordrehzahl", "dq"}}},
+      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "motordrehzahl", "dq", "qd"}}},
        "the motor's speed"},
       {windings, "the winding's temperature"},
       {housings, "the housing's temperature"},
@@ -253,6 +253,17 @@ std::optional<Guess> likely_temperature(const Table& table, const std::map<Role,
   return housing ? housing : winding;
 }
 
+/// A temperature, and of what nobody knows: temperature of moteus, Present Temperature of Dynamixel are the drive's
+/// own.
+bool says_nothing_of_itself(const std::string& name) {
+  constexpr std::string_view nothing[] = {"temp",   "temperature", "temperatures", "present",
+                                          "system", "c",           "degc",         "deg"};
+  const std::vector<std::string> words = words_of(name);
+  return std::all_of(words.begin(), words.end(), [&](const std::string& word) {
+    return std::find(std::begin(nothing), std::end(nothing), word) != std::end(nothing);
+  });
+}
+
 }  // namespace
 
 void note_doubtful_columns(const Table& table, const std::map<Role, Source>& found, std::vector<std::string>& notes) {
@@ -278,6 +289,11 @@ void note_doubtful_columns(const Table& table, const std::map<Role, Source>& fou
           fmt::format("Column '{}' is called as if it were of another motor than '{}'; if it is, nothing "
                       "here holds.",
                       found.at(role).column, heat));
+    if (foreign(role) && says_nothing_of_itself(found.at(role).column))
+      notes.push_back(
+          fmt::format("Column '{}' does not tell what it is the temperature of; many drives call their own so. If this "
+                      "is not the motor's, nothing here holds for the motor.",
+                      found.at(role).column));
     if (foreign(role) && of_a_controller(found.at(role).column) && !of_the_motor(found.at(role).column))
       notes.push_back(
           fmt::format("Column '{}' is called like the temperature of what drives the motor; if it is that, nothing "
