@@ -150,6 +150,13 @@ bool time_of_day(std::string_view s, double& value) {
   return true;
 }
 
+bool day_in(std::string_view s, double& days) {
+  std::chrono::year_month_day date;
+  if (!date_of(s, false, date)) return false;
+  days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+  return true;
+}
+
 bool like_a_moment(std::string_view s) {
   const auto many = [&](char c) { return std::count(s.begin(), s.end(), c); };
   return s.find_first_of("0123456789") != std::string_view::npos &&

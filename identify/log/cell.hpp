@@ -24,6 +24,8 @@ bool number_and_unit_in(std::string_view cell, bool decimal_comma, double& value
 
 /// A time without a date, as s since midnight; or what a stopwatch shows.
 bool time_of_day(std::string_view s, double& value);
+/// A date without a time, as days since 1970.
+bool day_in(std::string_view s, double& days);
 /// Perhaps a date or a time, in no form that is read.
 bool like_a_moment(std::string_view s);
 

@@ -126,6 +126,33 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
   return repeated;
 }
 
+int date_column(const Table& table) {
+  const auto is_date = [&](std::size_t c) {
+    const std::string low = in_small(trimmed(table.names[c]));
+    return (low == "date" || low == "datum") && table.words[c].count() == table.rows();
+  };
+  int found = -1;
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    if (!is_date(c)) continue;
+    if (found >= 0) return -1;
+    found = static_cast<int>(c);
+  }
+  return found;
+}
+
+bool add_days(Table& table, std::size_t time_column) {
+  const int column = date_column(table);
+  if (column < 0 || !table.of_day[time_column]) return false;
+  const Words& words = table.words[static_cast<std::size_t>(column)];
+  std::vector<double> days(words.seen.size());
+  for (std::size_t i = 0; i < days.size(); ++i) {
+    if (!day_in(words.seen[i], days[i])) return false;
+  }
+  for (std::size_t r = 0; r < table.rows(); ++r) table.columns[time_column][r] += day_s * days[words.of_row[r] - 1];
+  table.of_day[time_column] = false;
+  return true;
+}
+
 bool counts_from_midnight(const std::string& name) {
   const std::string low = in_small(name);
   return low.find("today") != low.npos || low.find("of_day") != low.npos || low.find("midnight") != low.npos;

@@ -196,6 +196,20 @@ TEST(Reader, DegreesInLatin1AreDegrees) {
   EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
 }
 
+TEST(Reader, Utf16InEitherOrderOfBytesIsRead) {
+  ColumnMap map;
+  add_column(map, "housing_degC=Gehäuse °F \U0001F321");
+  std::u16string text = u"time_s;current_A;Gehäuse °F \U0001F321\r\n0;1;50\r\n1;2;212\r\n";
+  for (const bool low_first : {true, false}) {
+    std::string bytes = low_first ? "\xFF\xFE" : "\xFE\xFF";
+    for (const char16_t unit : text) {
+      const char high = static_cast<char>(unit >> 8), low = static_cast<char>(unit & 0xFF);
+      bytes += {low_first ? low : high, low_first ? high : low};
+    }
+    EXPECT_DOUBLE_EQ(read(bytes, map)[0].of(Role::housing)[1], 212);
+  }
+}
+
 TEST(Reader, AUnitInAMappedColumnsNameIsObeyedUnlessOneWasSaid) {
   const std::string rows = "\n0,1000,50,60\n1500,2000,212,60\n";
   const std::string text = "Time (ms),Current [mA],T_body degF,n (rpm)" + rows;
@@ -407,6 +421,23 @@ TEST(Reader, ASensorThatReadsNothingButMinusOneIsLeftOut) {
   EXPECT_FALSE(logs[0].has(Role::ambient));
   says(fmt::format("{}", fmt::join(logs[0].notes, " ")), "ambient_degC is -1 in all rows, as of a sensor that is not");
   EXPECT_TRUE(read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,\n2,2,21,9\n")[0].has(Role::ambient));
+}
+
+TEST(Reader, ASensorThatIsOpenIsLeftOutAndIfItIsTheOnlyOneSaidToBe) {
+  // As VESC tells a motor without a thermistor.
+  const std::string rows = "0,1,-75.2,20\n1,2,-74.1,21\n2,2,-76,22\n";
+  const Log log = read("time_s,current_A,housing_degC,core_degC\n" + rows)[0];
+  EXPECT_FALSE(log.has(Role::housing));
+  EXPECT_TRUE(log.has(Role::core));
+  says(log.notes.at(0),
+       "housing_degC is below -45 in all rows, as of a sensor that is not connected, and was left out.");
+  ColumnMap map;
+  add_column(map, "housing_degC=temp_motor");
+  says(complaint("time_s,current_A,temp_motor,temp_mos\n" + rows, map),
+       "column 'temp_motor' is below -45 in all rows, as of a sensor that is not connected; connect it and record the "
+       "log again, or map another as housing_degC.");
+  says(complaint(head + "0,1,0\n1,2,0\n"), "column 'housing_degC' is 0 in all rows, as of a sensor that is not");
+  EXPECT_TRUE(read(head + "0,1,-75\n1,2,-40\n")[0].has(Role::housing));
 }
 
 TEST(Reader, AMeterThatReadsNothingButZeroDoesNotHideAnother) {
@@ -741,6 +772,13 @@ TEST(Rows, OfMotorsOneAfterTheOtherOrOfAWholeRobotAreRefusedAsWell) {
   says(complaint(robot), "several motors in turn, as column 'joint' tells (0, 1, 10");
 }
 
+TEST(Rows, WhatAMotorDidInOneRowBeforeTheClockBeganIsNoNameOfOne) {
+  // As a thrust stand's summary above its table.
+  std::string text = "time_s,current_A,housing_degC,Motor Efficiency (%)\n0.07,1,20,30.6\n";
+  for (int i = 0; i < 30; ++i) text += fmt::format("{},{},{},32.4\n", i, i % 3, 20 + i);
+  EXPECT_EQ(read(text)[0].of(Role::time).size(), 31u);
+}
+
 TEST(Rows, ACounterOfMessagesOrABitThatTogglesIsNoMotor) {
   std::string toggles = "time_s,current_A,housing_degC,alive\n", kinds = "time_s,current_A,housing_degC,id\n";
   for (int i = 0; i < 40; ++i) {
@@ -889,6 +927,28 @@ TEST(Reader, AColumnCalledTimeIsTheTime) {
   says(complaint("time,t,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
 }
 
+TEST(Reader, ATimeThatFewLoggersCallSoIsTheTimeWhereNoColumnIsCalledTime) {
+  for (const char* name : {"Seconds", "ts", "X_Value", ":Time"})
+    EXPECT_DOUBLE_EQ(read(std::string(name) + ",current_A,housing_degC\n0,1,20\n5,2,21\n")[0].of(Role::time)[1], 5);
+  EXPECT_DOUBLE_EQ(read("TimeUS,current_A,housing_degC\n0,1,20\n500000,2,21\n")[0].of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(read("Seconds,time,current_A,housing_degC\n9,0,1,20\n9,5,2,21\n")[0].of(Role::time)[1], 5);
+  says(complaint("seconds,ts,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
+}
+
+TEST(Reader, ADateBesideATimeOfDayTellsItsDay) {
+  // As radios and spreadsheets write them; the second row is thirty hours after the first.
+  const auto log = [](const std::string& first, const std::string& last) {
+    return read("Date,Time,current_A,housing_degC\n" + first + ",20:00:00.5,1,20\n" + last + ",02:00:01,2,21\n")[0];
+  };
+  for (const auto& [first, last] : {std::pair("2026-11-21", "2026-11-23"), std::pair("21.11.2026", "23.11.2026")})
+    EXPECT_NEAR(log(first, last).of(Role::time)[1], 30 * 3600 + 0.5, 1e-6);
+  says(log("2026-11-21", "2026-11-23").notes.at(1), "Column 'Date' tells the day of 'Time'.");
+  // A day or a month first: the clock alone is read.
+  EXPECT_NEAR(log("1/2/2026", "2/2/2026").of(Role::time)[1], 6 * 3600 + 0.5, 1e-6);
+  EXPECT_DOUBLE_EQ(
+      read("date,time_s,current_A,housing_degC\n2026-11-21,0,1,20\n2026-11-22,5,2,21\n")[0].of(Role::time)[1], 5);
+}
+
 TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
   const std::string sentence = complaint("Start time [s],Current [A],T_winding [C]\n0,1,20\n1,1,21\n");
   says(sentence, "a time column and the heat input (current_A, iq_A, power_W or torque_Nm) and a measured temperature");
@@ -984,6 +1044,15 @@ TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
   says(talon, "--column current_A=StatorCurrent");
   says(talon, "--column housing_degC=DeviceTemp");
   says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
+}
+
+TEST(Reader, CountsAndTheSpeedOfASatelliteReceiverAreNoGuess) {
+  const std::string raw = complaint("time_s,motor_current_raw,iq,motor_temp\n0,100,1,20\n1,200,2,21\n");
+  says(raw, "--column iq_A=iq");
+  const std::string wheel = complaint("time_s,gps_speed,speed,phase_current,motor_temp\n0,0,1,1,20\n1,5,2,2,21\n");
+  says(wheel, "--column speed_rad_per_s=speed ");
+  says(complaint("time_s,actual_current_0,actual_qd_0,joint_temp_0\n0,1,1,20\n1,2,2,21\n"),
+       "--column speed_rad_per_s=actual_qd_0");
 }
 
 TEST(Reader, OfThousandsOfColumnsTheFirstHundredAreNamed) {
@@ -1129,6 +1198,18 @@ TEST(Reader, AControllersTemperatureThatWasMappedIsSaidToBeOne) {
     EXPECT_EQ(notes_of(name).find("drives"), std::string::npos) << name;
 }
 
+TEST(Reader, OfATemperatureThatMayBeTheDrivesOwnItIsSaid) {
+  const auto notes_of = [](const std::string& name) {
+    ColumnMap map;
+    add_column(map, "housing_degC=" + name);
+    return fmt::format("{}", fmt::join(read("time_s,current_A," + name + "\n0,1,20\n1,2,21\n", map)[0].notes, " "));
+  };
+  for (const char* name : {"temperature", "Present Temperature (°C)", "system_temp", "temp_c"})
+    says(notes_of(name), "does not tell what it is the temperature of");
+  for (const char* name : {"motor_temperature", "T_case", "Tmp1", "temperature_stator"})
+    EXPECT_EQ(notes_of(name).find("does not tell"), std::string::npos) << name;
+}
+
 TEST(Reader, ATemperatureCalledAsOfAnotherMotorIsSaidToBe) {
   const auto notes_with = [](const std::string& housing) {
     ColumnMap map;
@@ -1242,6 +1323,12 @@ TEST(Reader, AMappedColumnThatIsNotThereIsNamedWithTheNearest) {
   identify::add_column(map, "housing_degC=T_bodi");
   says(complaint("time_s,current_A,T_body\n0,1,20\n", map, 2), "did you mean 'T_body'?");
 }
+TEST(Reader, AColumnsNameMayBeginWithAColon) {
+  ColumnMap map;
+  identify::add_column(map, "housing_degC=:Motor");
+  EXPECT_DOUBLE_EQ(read("time_s,current_A,:Motor\n0,1,20\n1,1,21\n", map)[0].of(Role::housing)[1], 21);
+}
+
 TEST(Reader, AColumnsNameMayHoldAColon) {
   ColumnMap map;
   identify::add_column(map, "housing_degC=T:case");
@@ -1454,7 +1541,8 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
   for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
   for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
-  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
+  for (const char* rad : {"rad_s", "rad.s-1"}) EXPECT_EQ(factor("speed_rad_per_s", rad), 1);
+  for (const char* mNm : {"N.mm", "Nmm", "N·mm"}) EXPECT_EQ(factor("torque_Nm", mNm), 1e-3);
   EXPECT_EQ(factor("current_A", "ma"), 1e-3);
   EXPECT_EQ(factor("time_s", "ns"), 1e-9);
   for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
