@@ -1055,6 +1055,25 @@ TEST(Reader, CountsAndTheSpeedOfASatelliteReceiverAreNoGuess) {
        "--column speed_rad_per_s=actual_qd_0");
 }
 
+TEST(Reader, AChannelWhoseUnitAloneTellsWhatItIsIsProposedWhereNoNameDoes) {
+  const std::string recorder = complaint("Time,1-1[A],1-2[C],1-3[V]\n0,1,20,5\n1,2,21,5\n");
+  says(recorder, "--column current_A=\"1-1[A]\" if it is the motor's own current");
+  says(recorder, "--column housing_degC=\"1-2[C]\"");
+  const std::string supply = complaint("Time,batt [A],esc [C]\n0,1,20\n1,2,21\n");
+  says(supply, "--column current_A=NAME");
+  says(supply, "--column housing_degC=NAME");
+}
+
+TEST(Reader, AMotorsTemperatureAndARoomsAreKnownByWhatFewCallThem) {
+  for (const char* name : {"tmpm", "Tmot", "t_mot", "temperature_motor"})  // OpenInverter's, and Kinova's
+    says(complaint(fmt::format("time_s,iq_A,temperature_core,tmp,{}\n0,1,30,1,20\n1,2,31,2,21\n", name)),
+         fmt::format("--column housing_degC={}.", name));
+  for (const char* name : {"T_amb", "Tamb", "temp_amb"})
+    says(complaint(fmt::format("time_s,iq_A,motor_temp,{}\n0,1,20,20\n1,2,21,20\n", name)),
+         fmt::format("--column ambient_degC={}.", name));
+  says(complaint("TimeString;VarName;VarValue\n0;I;1\n0;T;20\n"), "each row has one value ('VarValue')");
+}
+
 TEST(Reader, OfThousandsOfColumnsTheFirstHundredAreNamed) {
   std::string text = "time_s,current_A";
   for (int i = 0; i < 3000; ++i) text += fmt::format(",x{}", i);
@@ -1541,6 +1560,8 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
   for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
   for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
+  EXPECT_EQ(identify::unit_in_name("/Drive/VelocityRadPerSec", "speed_rad_per_s"), "RadPerSec");
+  EXPECT_EQ(factor("speed_rad_per_s", "RotPerSec"), 2 * M_PI);
   for (const char* rad : {"rad_s", "rad.s-1"}) EXPECT_EQ(factor("speed_rad_per_s", rad), 1);
   for (const char* mNm : {"N.mm", "Nmm", "N·mm"}) EXPECT_EQ(factor("torque_Nm", mNm), 1e-3);
   EXPECT_EQ(factor("current_A", "ma"), 1e-3);
