@@ -16,6 +16,17 @@ using wire::pc::refuse_data;
 
 constexpr double day_s = 86400;
 
+/// The day that each row of a column of dates tells, since 1970.
+std::vector<double> days_of(const Table& table, std::size_t column) {
+  std::vector<double> days(table.rows(), missing);
+  for (std::size_t r = 0; r < table.rows(); ++r) {
+    const double told_s = table.columns[column][r];
+    if (std::fmod(told_s, day_s) == 0) days[r] = told_s / day_s;
+    if (std::isnan(told_s) && !day_in(table.words[column].in_row(r), days[r])) days[r] = missing;
+  }
+  return days;
+}
+
 }  // namespace
 
 void check_epoch(const Log& log, double first_cell) {
@@ -127,13 +138,10 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
 }
 
 int date_column(const Table& table) {
-  const auto is_date = [&](std::size_t c) {
-    const std::string low = in_small(trimmed(table.names[c]));
-    return (low == "date" || low == "datum") && table.words[c].count() == table.rows();
-  };
   int found = -1;
   for (std::size_t c = 0; c < table.names.size(); ++c) {
-    if (!is_date(c)) continue;
+    const std::string low = in_small(trimmed(table.names[c]));
+    if ((low != "date" && low != "datum") || count_told(days_of(table, c)) < table.rows()) continue;
     if (found >= 0) return -1;
     found = static_cast<int>(c);
   }
@@ -143,12 +151,8 @@ int date_column(const Table& table) {
 bool add_days(Table& table, std::size_t time_column) {
   const int column = date_column(table);
   if (column < 0 || !table.of_day[time_column]) return false;
-  const Words& words = table.words[static_cast<std::size_t>(column)];
-  std::vector<double> days(words.seen.size());
-  for (std::size_t i = 0; i < days.size(); ++i) {
-    if (!day_in(words.seen[i], days[i])) return false;
-  }
-  for (std::size_t r = 0; r < table.rows(); ++r) table.columns[time_column][r] += day_s * days[words.of_row[r] - 1];
+  const std::vector<double> days = days_of(table, static_cast<std::size_t>(column));
+  for (std::size_t r = 0; r < table.rows(); ++r) table.columns[time_column][r] += day_s * days[r];
   table.of_day[time_column] = false;
   return true;
 }

@@ -151,8 +151,7 @@ bool seldom_named_time(const std::string& name) {
          std::find(std::begin(words), std::end(words), in_small(word)) != std::end(words);
 }
 
-/// The only column without a role that is called so, and of a date and a time of day the latter; empty: none, or
-/// several.
+/// The only column without a role that is called so, and is no date without a time; empty: none, or several.
 std::string called_time(const Table& table, const std::map<Role, Source>& found) {
   const auto taken = [&](const std::string& name) {
     return std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
@@ -163,7 +162,7 @@ std::string called_time(const Table& table, const std::map<Role, Source>& found)
       if (called(name) && !taken(name)) names.push_back(name);
     }
     const int date = date_column(table);
-    if (names.size() == 2 && date >= 0) std::erase(names, table.names[static_cast<std::size_t>(date)]);
+    if (date >= 0) std::erase(names, table.names[static_cast<std::size_t>(date)]);
     if (!names.empty()) return names.size() == 1 ? names.front() : "";
   }
   return "";

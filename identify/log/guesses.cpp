@@ -341,16 +341,17 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                 {{Role::time, {"time", "zeit", "stamp", "ms", "millis", "micros"}}, {Role::time, {"date", "datum"}}}),
             "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
   if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
-    auto guess = likely_column(table, taken_of(taken),
-                               {{Role::current, {"motor current", "motor_current", "motorcurrent", "motorstrom"}},
-                                {Role::current, {"phase current", "phase_current", "phasecurrent"}},
-                                {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
-                                {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
-                                {Role::current, {"current", "curr", "strom", "amp"}},
-                                {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
-                                {Role::torque, {"torque", "tau", "effort", "drehmoment"}},
-                                {Role::power, {"loss", "p_loss", "verlust"}},
-                                {Role::power, {"power", "watt", "leistung"}}});
+    auto guess = likely_column(
+        table, taken_of(taken),
+        {{Role::current, {"motor current", "motor_current", "motorcurrent", "motorstrom"}},
+         {Role::current, {"phase current", "phase_current", "phasecurrent", "i_phase", "iphase", "i_mot"}},
+         {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
+         {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
+         {Role::current, {"current", "curr", "strom", "amp"}},
+         {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
+         {Role::torque, {"torque", "tau", "effort", "drehmoment"}},
+         {Role::power, {"loss", "p_loss", "verlust"}},
+         {Role::power, {"power", "watt", "leistung"}}});
     if (!guess) guess = column_by_unit(table, taken_of(taken), Role::current);
     ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
     if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";

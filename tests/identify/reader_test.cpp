@@ -561,7 +561,7 @@ TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
       " is not a number, nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
       "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
       "--period S does without); repair it";
-  for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "12/31/2025 10:00:00",
+  for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "13/31/2025 10:00:00",
                            "13.5:00 AM", "8:15 PM", "2025-06-01", "Dec 31 10:00:00 2025"})
     says(complaint(head + date + ",1,20\n"), forms);
   for (const char* time :
@@ -857,8 +857,7 @@ TEST(Reader, DatesAreReadInEachFormThatCannotBeAnother) {
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 AM,1,20\n12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 PM,1,20\n12:00:30 AM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11/20/2026 11:59:30 AM,1,20\n11/20/2026 12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
-  for (const char* either :
-       {"11/20/2026 08:15:30", "21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
+  for (const char* either : {"21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
     says(complaint(head + either + ",1,20\n"), "nor a time as it is read");
 }
 
@@ -935,6 +934,25 @@ TEST(Reader, ATimeThatFewLoggersCallSoIsTheTimeWhereNoColumnIsCalledTime) {
   says(complaint("seconds,ts,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
 }
 
+TEST(Reader, DatesBetweenStrokesAreReadInTheOrderInWhichTheirDaysFollowEachOther) {
+  // As spreadsheets write them in America and in Britain, and Keysight's recorders.
+  const auto log = [](const std::string& first, const std::string& last) {
+    return read("Time,current_A,housing_degC\n" + first + ",1,20\n" + last + ",2,21\n")[0];
+  };
+  EXPECT_DOUBLE_EQ(log("1/8/2026 17:30", "1/8/2026 17:31").of(Role::time)[1], 60);
+  EXPECT_DOUBLE_EQ(log("01/08/2026 17:30:00:250", "01/08/2026 17:30:00:500").of(Role::time)[1], 0.25);
+  EXPECT_DOUBLE_EQ(log("12/31/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
+  EXPECT_DOUBLE_EQ(log("31/12/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
+  const Log months = log("1/8/2026 23:59:59", "1/9/2026 00:00:01"),
+            days = log("8/1/2026 23:59:59", "9/1/2026 00:00:01");
+  EXPECT_DOUBLE_EQ(months.of(Role::time)[1], 2);
+  EXPECT_DOUBLE_EQ(days.of(Role::time)[1], 2);
+  says(months.notes.at(0),
+       "Dates of column 'Time' are read with the month first, so that they lie 0 days apart and not 30.");
+  says(days.notes.at(0), "with the day first");
+  says(complaint("Time,current_A,housing_degC\n13/31/2026 17:30,1,20\n13/31/2026 17:31,2,21\n"), "nor a time as it is");
+}
+
 TEST(Reader, ADateBesideATimeOfDayTellsItsDay) {
   // As radios and spreadsheets write them; the second row is thirty hours after the first.
   const auto log = [](const std::string& first, const std::string& last) {
@@ -943,8 +961,9 @@ TEST(Reader, ADateBesideATimeOfDayTellsItsDay) {
   for (const auto& [first, last] : {std::pair("2026-11-21", "2026-11-23"), std::pair("21.11.2026", "23.11.2026")})
     EXPECT_NEAR(log(first, last).of(Role::time)[1], 30 * 3600 + 0.5, 1e-6);
   says(log("2026-11-21", "2026-11-23").notes.at(1), "Column 'Date' tells the day of 'Time'.");
-  // A day or a month first: the clock alone is read.
-  EXPECT_NEAR(log("1/2/2026", "2/2/2026").of(Role::time)[1], 6 * 3600 + 0.5, 1e-6);
+  for (const auto& [first, last] : {std::pair("1/2/2026", "3/2/2026"), std::pair("2/1/2026", "2/3/2026")})
+    EXPECT_NEAR(log(first, last).of(Role::time)[1], 30 * 3600 + 0.5, 1e-6);
+  says(complaint("Date,current_A,housing_degC\n1/2/2026,1,20\n1/2/2026,2,21\n"), "a time column is missing");
   EXPECT_DOUBLE_EQ(
       read("date,time_s,current_A,housing_degC\n2026-11-21,0,1,20\n2026-11-22,5,2,21\n")[0].of(Role::time)[1], 5);
 }
@@ -1071,6 +1090,9 @@ TEST(Reader, AMotorsTemperatureAndARoomsAreKnownByWhatFewCallThem) {
   for (const char* name : {"T_amb", "Tamb", "temp_amb"})
     says(complaint(fmt::format("time_s,iq_A,motor_temp,{}\n0,1,20,20\n1,2,21,20\n", name)),
          fmt::format("--column ambient_degC={}.", name));
+  for (const char* name : {"I_phase", "I_mot"})
+    says(complaint(fmt::format("time_s,I_bat,{},motor_temp\n0,1,1,20\n1,2,2,21\n", name)),
+         fmt::format("--column current_A={};", name));
   says(complaint("TimeString;VarName;VarValue\n0;I;1\n0;T;20\n"), "each row has one value ('VarValue')");
 }
 
