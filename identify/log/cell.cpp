@@ -164,7 +164,9 @@ bool stroked_date(std::string_view s, double& month_first_s, double& day_first_s
   if (colons == 1) clock += ":00";
   if (colons == 3) clock[clock.rfind(':')] = '.';  // 17:30:00:250, as Keysight's recorders write
   double clock_s = 0;
-  if (date.find('/') == std::string::npos || (!clock.empty() && !on_a_clock(clock, clock_s))) return false;
+  const std::size_t stroke = date.find_first_of("/-");
+  if (stroke > 2 || (!clock.empty() && !on_a_clock(clock, clock_s))) return false;
+  std::replace(date.begin(), date.end(), '-', '/');
   const auto since_1970_s = [&](bool month_first) {
     std::chrono::year_month_day day;
     if (!date_of(date, month_first, day)) return missing;

@@ -105,7 +105,8 @@ void spread_shared_times(Log& log) {
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] != t[i - 1]) first.push_back(i);
   }
-  if (first.size() < 3 || t.size() < 2 * first.size()) return;
+  // Of two rows a second some are missing, or were the same and left out.
+  if (first.size() < 3 || 2 * t.size() < 3 * first.size()) return;
   const std::vector<double> told_s = t;
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < first.size(); ++k) steps_s.push_back(told_s[first[k]] - told_s[first[k - 1]]);

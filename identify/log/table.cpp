@@ -353,10 +353,10 @@ void read_dates(Table& table, std::size_t c, const StrokedDates& dates) {
   table.complaints[c].clear();
   constexpr double day_s = 86400;
   if (!std::isnan(month_first_s + day_first_s) && month_first_s != day_first_s)
-    table.notes.push_back(fmt::format(
-        "Dates of column '{}' are read with the {} first, so that they lie {:.0f} days apart and not {:.0f}.",
-        table.names[c], month_first ? "month" : "day", std::min(month_first_s, day_first_s) / day_s,
-        std::max(month_first_s, day_first_s) / day_s));
+    table.notes.push_back(
+        fmt::format("Dates of column '{}' are read with the {} first, so that they span {:.3g} d and not {:.3g}.",
+                    table.names[c], month_first ? "month" : "day", std::min(month_first_s, day_first_s) / day_s,
+                    std::max(month_first_s, day_first_s) / day_s));
 }
 
 void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line,

@@ -523,6 +523,14 @@ TEST(Reader, RowsThatShareAWholeSecondAreSpreadOverIt) {
   says(log.notes[0], "About 10 rows share each time; they are spread over the 1 s to the next.");
 }
 
+TEST(Reader, TwoRowsASecondAreSpreadWhereSomeAreMissing) {
+  std::string text = head;
+  for (int i = 0; i < 20; ++i) text += i == 7 ? "" : fmt::format("{},{},{}\n", i / 2, i, 20 + i);
+  const Log log = read(text)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[18], 9.5);
+}
+
 TEST(Reader, RowsInBurstsAreNotTakenForRowsThatAreMissing) {
   const auto period_s = [](auto time_of) {
     std::vector<double> t;
@@ -857,7 +865,7 @@ TEST(Reader, DatesAreReadInEachFormThatCannotBeAnother) {
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 AM,1,20\n12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 PM,1,20\n12:00:30 AM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11/20/2026 11:59:30 AM,1,20\n11/20/2026 12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
-  for (const char* either : {"21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
+  for (const char* either : {"21-21-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
     says(complaint(head + either + ",1,20\n"), "nor a time as it is read");
 }
 
@@ -941,6 +949,7 @@ TEST(Reader, DatesBetweenStrokesAreReadInTheOrderInWhichTheirDaysFollowEachOther
   };
   EXPECT_DOUBLE_EQ(log("1/8/2026 17:30", "1/8/2026 17:31").of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(log("01/08/2026 17:30:00:250", "01/08/2026 17:30:00:500").of(Role::time)[1], 0.25);
+  EXPECT_DOUBLE_EQ(log("31-12-2026 23:59:59", "01-01-2027 00:00:01").of(Role::time)[1], 2);
   EXPECT_DOUBLE_EQ(log("12/31/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
   EXPECT_DOUBLE_EQ(log("31/12/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
   const Log months = log("1/8/2026 23:59:59", "1/9/2026 00:00:01"),
@@ -948,7 +957,7 @@ TEST(Reader, DatesBetweenStrokesAreReadInTheOrderInWhichTheirDaysFollowEachOther
   EXPECT_DOUBLE_EQ(months.of(Role::time)[1], 2);
   EXPECT_DOUBLE_EQ(days.of(Role::time)[1], 2);
   says(months.notes.at(0),
-       "Dates of column 'Time' are read with the month first, so that they lie 0 days apart and not 30.");
+       "Dates of column 'Time' are read with the month first, so that they span 2.31e-05 d and not 30.");
   says(days.notes.at(0), "with the day first");
   says(complaint("Time,current_A,housing_degC\n13/31/2026 17:30,1,20\n13/31/2026 17:31,2,21\n"), "nor a time as it is");
 }
