@@ -150,6 +150,34 @@ bool time_of_day(std::string_view s, double& value) {
   return true;
 }
 
+bool day_in(std::string_view s, double& days) {
+  std::chrono::year_month_day date;
+  if (!date_of(s, false, date)) return false;
+  days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+  return true;
+}
+
+bool stroked_date(std::string_view s, double& month_first_s, double& day_first_s) {
+  const std::size_t begin = s.find(' ');
+  std::string clock(begin == std::string_view::npos ? "" : trimmed(s.substr(begin))), date(s.substr(0, begin));
+  const auto colons = std::count(clock.begin(), clock.end(), ':');
+  if (colons == 1) clock += ":00";
+  if (colons == 3) clock[clock.rfind(':')] = '.';  // 17:30:00:250, as Keysight's recorders write
+  double clock_s = 0;
+  const std::size_t stroke = date.find_first_of("/-");
+  if (stroke > 2 || (!clock.empty() && !on_a_clock(clock, clock_s))) return false;
+  std::replace(date.begin(), date.end(), '-', '/');
+  const auto since_1970_s = [&](bool month_first) {
+    std::chrono::year_month_day day;
+    if (!date_of(date, month_first, day)) return missing;
+    return 86400.0 * static_cast<double>(std::chrono::sys_days(day).time_since_epoch().count()) + clock_s;
+  };
+  month_first_s = since_1970_s(true);
+  std::replace(date.begin(), date.end(), '/', '.');
+  day_first_s = since_1970_s(false);
+  return !std::isnan(month_first_s) || !std::isnan(day_first_s);
+}
+
 bool like_a_moment(std::string_view s) {
   const auto many = [&](char c) { return std::count(s.begin(), s.end(), c); };
   return s.find_first_of("0123456789") != std::string_view::npos &&

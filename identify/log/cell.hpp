@@ -24,6 +24,11 @@ bool number_and_unit_in(std::string_view cell, bool decimal_comma, double& value
 
 /// A time without a date, as s since midnight; or what a stopwatch shows.
 bool time_of_day(std::string_view s, double& value);
+/// A date without a time, as days since 1970.
+bool day_in(std::string_view s, double& days);
+/// A date between strokes, its day or its month first (1/8/2023, 01-08-2023), alone or with a time of 24 hours behind
+/// it: s since 1970 of either, missing where there is no such month.
+bool stroked_date(std::string_view s, double& month_first_s, double& day_first_s);
 /// Perhaps a date or a time, in no form that is read.
 bool like_a_moment(std::string_view s);
 

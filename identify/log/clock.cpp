@@ -16,6 +16,17 @@ using wire::pc::refuse_data;
 
 constexpr double day_s = 86400;
 
+/// The day that each row of a column of dates tells, since 1970.
+std::vector<double> days_of(const Table& table, std::size_t column) {
+  std::vector<double> days(table.rows(), missing);
+  for (std::size_t r = 0; r < table.rows(); ++r) {
+    const double told_s = table.columns[column][r];
+    if (std::fmod(told_s, day_s) == 0) days[r] = told_s / day_s;
+    if (std::isnan(told_s) && !day_in(table.words[column].in_row(r), days[r])) days[r] = missing;
+  }
+  return days;
+}
+
 }  // namespace
 
 void check_epoch(const Log& log, double first_cell) {
@@ -94,7 +105,8 @@ void spread_shared_times(Log& log) {
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] != t[i - 1]) first.push_back(i);
   }
-  if (first.size() < 3 || t.size() < 2 * first.size()) return;
+  // Of two rows a second some are missing, or were the same and left out.
+  if (first.size() < 3 || 2 * t.size() < 3 * first.size()) return;
   const std::vector<double> told_s = t;
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < first.size(); ++k) steps_s.push_back(told_s[first[k]] - told_s[first[k - 1]]);
@@ -124,6 +136,26 @@ std::size_t drop_repeated(std::vector<std::size_t>& rows, const Table& table, co
   const auto repeated = static_cast<std::size_t>(rows.end() - end);
   rows.erase(end, rows.end());
   return repeated;
+}
+
+int date_column(const Table& table) {
+  int found = -1;
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    const std::string low = in_small(trimmed(table.names[c]));
+    if ((low != "date" && low != "datum") || count_told(days_of(table, c)) < table.rows()) continue;
+    if (found >= 0) return -1;
+    found = static_cast<int>(c);
+  }
+  return found;
+}
+
+bool add_days(Table& table, std::size_t time_column) {
+  const int column = date_column(table);
+  if (column < 0 || !table.of_day[time_column]) return false;
+  const std::vector<double> days = days_of(table, static_cast<std::size_t>(column));
+  for (std::size_t r = 0; r < table.rows(); ++r) table.columns[time_column][r] += day_s * days[r];
+  table.of_day[time_column] = false;
+  return true;
 }
 
 bool counts_from_midnight(const std::string& name) {

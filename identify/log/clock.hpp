@@ -23,6 +23,12 @@ Source give_clock(Table& table, const std::vector<Session>& sessions, double per
 /// Refuses a clock that counts in no seconds: from 1970 (1e11 s is in the year 5138), or for longer than any recording.
 void check_epoch(const Log& log, double first_cell);
 
+/// The only column called date that tells a day in each row; -1: none, or several.
+int date_column(const Table& table);
+
+/// Adds the day that such a column tells to a time of day; false: there is none, or the time has a day.
+bool add_days(Table& table, std::size_t time_column);
+
 /// Is a column of numbers a time of day by its name, as ms_today is?
 bool counts_from_midnight(const std::string& name);
 

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "identify/log/clock.hpp"
 #include "identify/log/guesses.hpp"
 #include "identify/log/units.hpp"
 #include "wire/pc/names.hpp"
@@ -130,22 +131,41 @@ void refuse_thousands(const Table& table, std::size_t column) {
                             table.names[column]));
 }
 
-/// The only column without a role that is called nothing but time; empty: none, or several.
-std::string called_time(const Table& table, const std::map<Role, Source>& found) {
+/// Is a column called nothing but time, with or without its unit behind it?
+bool named_time(const std::string& name) {
   constexpr std::string_view words[] = {"time", "timestamp", "elapsedtime", "date", "datetime", "date/time", "zeit"};
-  const auto is_time = [&](const std::string& name) {
-    const bool taken = std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
-    std::string word = bare(name);
-    if (const std::size_t cut = word.rfind('_');
-        cut != word.npos && cut > 0 && quantity_of(word.substr(cut + 1)) == "time")
-      word.resize(cut);
-    std::erase_if(word, [](char c) { return c == '_' || c == ' ' || c == '%'; });
-    const bool says_so =
-        word == "t" || std::find(std::begin(words), std::end(words), in_small(word)) != std::end(words);
-    return says_so && !taken;  // T is a temperature
+  std::string word = bare(name);
+  if (const std::size_t cut = word.rfind('_');
+      cut != word.npos && cut > 0 && quantity_of(word.substr(cut + 1)) == "time")
+    word.resize(cut);
+  std::erase_if(word, [](char c) { return c == '_' || c == ' ' || c == '%' || c == ':'; });
+  return word == "t" ||  // T is a temperature
+         std::find(std::begin(words), std::end(words), in_small(word)) != std::end(words);
+}
+
+/// And by what few loggers call it: Castle's Seconds, LabVIEW's X_Value, ArduPilot's TimeUS.
+bool seldom_named_time(const std::string& name) {
+  constexpr std::string_view words[] = {"seconds", "sec", "secs", "ts", "x_value"};
+  const std::string word = bare(name);
+  return word == "TimeUS" || word == "TimeMS" ||
+         std::find(std::begin(words), std::end(words), in_small(word)) != std::end(words);
+}
+
+/// The only column without a role that is called so, and is no date without a time; empty: none, or several.
+std::string called_time(const Table& table, const std::map<Role, Source>& found) {
+  const auto taken = [&](const std::string& name) {
+    return std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.second.column == name; });
   };
-  const auto first = std::find_if(table.names.begin(), table.names.end(), is_time);
-  return std::count_if(table.names.begin(), table.names.end(), is_time) == 1 ? *first : "";
+  for (const auto& called : {named_time, seldom_named_time}) {
+    std::vector<std::string> names;
+    for (const std::string& name : table.names) {
+      if (called(name) && !taken(name)) names.push_back(name);
+    }
+    const int date = date_column(table);
+    if (date >= 0) std::erase(names, table.names[static_cast<std::size_t>(date)]);
+    if (!names.empty()) return names.size() == 1 ? names.front() : "";
+  }
+  return "";
 }
 
 /// What a row of units says of a column; empty: nothing.
@@ -208,7 +228,7 @@ void add_column(ColumnMap& map, const std::string& text, const std::string& from
   const Role role = role_named(std::string(trimmed(std::string_view(text).substr(0, equals))), where);
   const std::string rest(trimmed(std::string_view(text).substr(equals + 1)));
   const std::size_t colon = rest.rfind(':');
-  if (rest.empty() || colon == 0) {
+  if (rest.empty() || rest == ":") {
     refuse(where + ": the column's name is missing behind '='.");
   }
   Source source{rest};

@@ -83,7 +83,7 @@ bool of_the_supply(const std::string& name) {
 /// quantity (current_temperature is no current, and StatorCurrent no stator's temperature).
 bool is_none(const std::string& name, Role role) {
   const bool temperature = has_any(name, {"temp", "degc", "\u00b0c"});
-  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan"});
+  if (role == Role::speed) return has_any(name, {"mps", "kmh", "km/h", "meters", "m/s", "fan", "gps"});
   if (role == Role::current)
     return temperature || of_the_supply(name) ||
            has_any(name, {"charge", "hour", "state", "mode", "pos", "angle", "speed", "vel", "rpm", "time", "volt",
@@ -104,10 +104,10 @@ bool of_the_motor(const std::string& name) {
                         "current_q"});
 }
 
-/// What was asked for, beside what is: Iq_setpoint and Iq_measured.
+/// What was asked for, beside what is, or counts beside what they are worth: Iq_setpoint and current_raw, Iq_measured.
 bool is_commanded(const std::string& name) {
-  return has_any(
-      name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max", "error"});
+  return has_any(name, {"set", "target", "goal", "command", "cmd", "desired", "demand", "ref", "limit", "lim", "max",
+                        "error", "raw", "adc"});
 }
 
 /// esc[0].motor_temp: esc, 0, motor, temp.
@@ -167,6 +167,15 @@ std::optional<Guess> likely_column(const Table& table, const Taken& taken, const
   return best;
 }
 
+/// The first column that nothing but its unit tells to be of such a role: "1-1 [A]", as recorders call their channels.
+std::optional<Guess> column_by_unit(const Table& table, const Taken& taken, Role role) {
+  for (const std::string& name : table.names) {
+    const bool other = std::find(taken.columns.begin(), taken.columns.end(), name) != taken.columns.end();
+    if (!other && !is_none(name, role) && !unit_in_name(name, own_name(role)).empty()) return Guess{role, name, ""};
+  }
+  return std::nullopt;
+}
+
 /// What has to be said with a speed's column whose name tells no unit of the shaft's.
 std::string speed_words(const std::string& name) {
   if (named_electrical(name)) return " (electrical: with its unit, as :0.1429rpm of seven pole pairs)";
@@ -188,13 +197,14 @@ const std::vector<Likely> windings = {{Role::core, {"winding", "coil", "wicklung
                           housings = {{Role::housing,
                                        {"housing", "casing", "case", "yoke", "geh\u00e4use", "gehaeuse"}},
                                       {Role::housing, {"stator"}}},
-                          rooms = {{Role::ambient, {"ambient", "room", "umgebung"}}},
+                          rooms = {{Role::ambient, {"amb", "tamb", "room", "umgebung"}}},
                           coolants = {{Role::coolant, {"coolant"}}};
 
 /// Columns that nothing needs, and that would tell more; `what` each is.
 std::vector<std::pair<Guess, const char*>> useful_columns(const Table& table, std::map<Role, Source> found) {
   const std::pair<std::vector<Likely>, const char*> useful[] = {
-      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "motordrehzahl", "dq"}}},
+      {{{Role::speed, {"velocity", "vel", "speed", "rpm", "erpm", "omega", "drehzahl", "motordrehzahl"}},
+        {Role::speed, {"dq", "qd"}}},
        "the motor's speed"},
       {windings, "the winding's temperature"},
       {housings, "the housing's temperature"},
@@ -223,9 +233,10 @@ void refuse_one_value_a_row(const Table& table) {
     });
     return at == table.names.end() ? std::string() : *at;
   };
-  const std::string value = any({"_value", "value", "state", "physvalue", "phys_value", "wert", "messwert"});
+  const std::string value =
+      any({"_value", "value", "state", "physvalue", "phys_value", "wert", "messwert", "varvalue"});
   const std::string of = any({"_field", "field", "entity_id", "entry", "key", "metric", "name", "signal", "signal_name",
-                              "channel", "topic", "variable", "signalname", "kanal"});
+                              "channel", "topic", "variable", "signalname", "kanal", "varname"});
   if (!value.empty() && !of.empty())
     refuse_data(
         fmt::format("{}: each row has one value ('{}') and what it is of ('{}'); pivot the table, so that each "
@@ -236,7 +247,9 @@ void refuse_one_value_a_row(const Table& table) {
 /// A temperature of the motor, where no column has such a role: the housing's rather than the winding's, and one that
 /// stands, as of a sensor that is not connected, rather than what may be the controller's.
 std::optional<Guess> likely_temperature(const Table& table, const std::map<Role, Source>& found) {
-  const Likely motors = {Role::housing, {"motor temp", "motor_temp", "temp_motor", "motortemp", "mottemp", "mot_temp"}};
+  const Likely motors = {Role::housing,
+                         {"motor temp", "motor_temp", "temp_motor", "motortemp", "mottemp", "mot_temp",
+                          "temperature motor", "temperature_motor", "tmot", "t_mot", "tmpm"}};
   Taken taken = taken_of(found);
   const auto winding = likely_column(table, taken, windings);
   for (const auto& other : {windings, rooms, coolants}) {
@@ -250,7 +263,18 @@ std::optional<Guess> likely_temperature(const Table& table, const std::map<Role,
   likely.insert(likely.begin(), motors);
   if (!winding && !motor) likely.push_back({Role::housing, {"temp", "degc", "\u00b0c", "t_"}});
   const auto housing = likely_column(table, taken, likely);
-  return housing ? housing : winding;
+  return housing ? housing : winding ? winding : column_by_unit(table, taken, Role::housing);
+}
+
+/// A temperature, and of what nobody knows: temperature of moteus, Present Temperature of Dynamixel are the drive's
+/// own.
+bool says_nothing_of_itself(const std::string& name) {
+  constexpr std::string_view nothing[] = {"temp",   "temperature", "temperatures", "present",
+                                          "system", "c",           "degc",         "deg"};
+  const std::vector<std::string> words = words_of(name);
+  return std::all_of(words.begin(), words.end(), [&](const std::string& word) {
+    return std::find(std::begin(nothing), std::end(nothing), word) != std::end(nothing);
+  });
 }
 
 }  // namespace
@@ -278,6 +302,11 @@ void note_doubtful_columns(const Table& table, const std::map<Role, Source>& fou
           fmt::format("Column '{}' is called as if it were of another motor than '{}'; if it is, nothing "
                       "here holds.",
                       found.at(role).column, heat));
+    if (foreign(role) && says_nothing_of_itself(found.at(role).column))
+      notes.push_back(
+          fmt::format("Column '{}' does not tell what it is the temperature of; many drives call their own so. If this "
+                      "is not the motor's, nothing here holds for the motor.",
+                      found.at(role).column));
     if (foreign(role) && of_a_controller(found.at(role).column) && !of_the_motor(found.at(role).column))
       notes.push_back(
           fmt::format("Column '{}' is called like the temperature of what drives the motor; if it is that, nothing "
@@ -312,16 +341,18 @@ void refuse_without_columns(const Table& table, const std::map<Role, Source>& fo
                 {{Role::time, {"time", "zeit", "stamp", "ms", "millis", "micros"}}, {Role::time, {"date", "datum"}}}),
             "call it time_s, say {}, or --period S where the rows are S seconds apart", Role::time);
   if (none_of({Role::current, Role::iq, Role::phase_a, Role::power, Role::torque})) {
-    const auto guess = likely_column(table, taken_of(taken),
-                                     {{Role::current, {"motor current", "motor_current", "motorcurrent", "motorstrom"}},
-                                      {Role::current, {"phase current", "phase_current", "phasecurrent"}},
-                                      {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
-                                      {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
-                                      {Role::current, {"current", "curr", "strom", "amp"}},
-                                      {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
-                                      {Role::torque, {"torque", "tau", "effort", "drehmoment"}},
-                                      {Role::power, {"loss", "p_loss", "verlust"}},
-                                      {Role::power, {"power", "watt", "leistung"}}});
+    auto guess = likely_column(
+        table, taken_of(taken),
+        {{Role::current, {"motor current", "motor_current", "motorcurrent", "motorstrom"}},
+         {Role::current, {"phase current", "phase_current", "phasecurrent", "i_phase", "iphase", "i_mot"}},
+         {Role::iq, {"current_motor"}},  // an amplitude: the name is VESC's
+         {Role::iq, {"iq", "i_q", "q-axis", "q_axis", "q_current", "current_q"}},
+         {Role::current, {"current", "curr", "strom", "amp"}},
+         {Role::phase_a, {"ia", "i_a", "iu", "i_u", "phase_a"}},
+         {Role::torque, {"torque", "tau", "effort", "drehmoment"}},
+         {Role::power, {"loss", "p_loss", "verlust"}},
+         {Role::power, {"power", "watt", "leistung"}}});
+    if (!guess) guess = column_by_unit(table, taken_of(taken), Role::current);
     ask_for("the heat input (current_A, iq_A, power_W or torque_Nm)", guess, "map it with {}", Role::current);
     if (!guess) hints.back() += ", or join it to this table by time if it was recorded in another";
     if (guess && guess->role == Role::current && !of_the_motor(guess->column))

@@ -81,6 +81,12 @@ double lowest(const std::vector<double>& v) {
   return low;
 }
 
+double highest(const std::vector<double>& v) {
+  double high = missing;
+  for (const double x : v) high = std::fmax(high, x);
+  return high;
+}
+
 double most_current_A(const std::optional<wire::Motor>& motor) { return motor ? 40 * motor->rated_current_A : 1000; }
 
 void forget_impossible(Log& log) {

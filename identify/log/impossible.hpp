@@ -16,6 +16,7 @@ double most_current_A(const std::optional<wire::Motor>& motor);
 
 /// The least of what is told; missing when nothing is.
 double lowest(const std::vector<double>& column);
+double highest(const std::vector<double>& column);
 
 /// What a logger writes for a sensor that does not answer, -999 or -32768, is no temperature.
 void forget_impossible(Log& log);

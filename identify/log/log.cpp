@@ -75,6 +75,15 @@ void forget_unread(std::vector<double>& cells, const std::string& column, std::v
   notes.push_back(fmt::format("Column '{}' is {:g} in {} rows, which count as not read.", column, no_reading, unread));
 }
 
+/// What a column of a sensor that is not connected says; empty: it may be one that is. 0 degC or -1 all along, and not
+/// by a hundredth otherwise, is no weather, nor is what noise makes of an open thermistor, about -75 (VESC).
+std::string not_connected(const std::vector<double>& degC) {
+  constexpr double no_weather_degC = -45;
+  if (count_told(degC) < 2) return "";
+  if (stands(degC) && (lowest(degC) == 0 || lowest(degC) == -1)) return fmt::format("is {:g}", lowest(degC));
+  return highest(degC) < no_weather_degC ? fmt::format("is below {:g}", no_weather_degC) : "";
+}
+
 Log one_log(const Table& table, const std::map<Role, Source>& found, const std::vector<std::size_t>& chosen,
             const std::string& name, const std::optional<wire::Motor>& motor) {
   Log log;
@@ -109,11 +118,16 @@ Log one_log(const Table& table, const std::map<Role, Source>& found, const std::
       log.notes.push_back(fmt::format("Column '{}' shows negative numbers without their sign, {:.0f} for -1; read so.",
                                       source.column, std::exp2(bits) - 1));
     for (double& x : to) x = source.factor * (x + source.offset);
-    // A sensor that is not connected; 0 degC or -1 all along, and not by a hundredth otherwise, is no weather.
-    const bool unplugged = is_temperature && count_told(to) > 1 && stands(to) && (lowest(to) == 0 || lowest(to) == -1);
-    if (unplugged) {
-      log.notes.push_back(fmt::format("{} is {:g} in all rows, as of a sensor that is not connected, and was left out.",
-                                      own_name(role), lowest(to)));
+    if (const std::string idle = is_temperature ? not_connected(to) : ""; !idle.empty()) {
+      const std::string why = fmt::format("{} in all rows, as of a sensor that is not connected", idle);
+      // Without a temperature of the motor nobody would see the note.
+      const bool other = std::any_of(found.begin(), found.end(), [&](const auto& f) {
+        return f.first != role && (f.first == Role::housing || f.first == Role::core || f.first == Role::winding_ohm);
+      });
+      if ((role == Role::housing || role == Role::core) && !other)
+        refuse_data(fmt::format("{}: column '{}' {}; connect it and record the log again, or map another as {}.", name,
+                                source.column, why, own_name(role)));
+      log.notes.push_back(fmt::format("{} {}, and was left out.", own_name(role), why));
       to.clear();
     } else if (count_told(to) == 0) {
       to.clear();
@@ -209,6 +223,10 @@ std::vector<Log> logs_of(Table table, const ColumnMap& map, const std::optional<
   keep_rows(table, map.rows);
   auto found = resolve(table, map, unit_notes);
   const auto has = [&](Role r) { return found.contains(r); };
+  if (has(Role::time) && add_days(table, index_of(table, found.at(Role::time))))
+    unit_notes.push_back(fmt::format("Column '{}' tells the day of '{}'.",
+                                     table.names[static_cast<std::size_t>(date_column(table))],
+                                     found.at(Role::time).column));
   const bool by_row = !std::isnan(map.period_s);
   if (by_row && has(Role::time))
     refuse(fmt::format("{}: its column '{}' tells the time; leave the period of its rows away.", table.file,

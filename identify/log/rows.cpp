@@ -115,10 +115,14 @@ std::string several_motors(const Table& table, const std::vector<double>& time, 
       changes += changed;
       begins += changed && !time.empty() && time[r] < time[r - 1];
     }
+    constexpr std::ptrdiff_t least_rows = 5;  // of each: what hardly comes again is a reading and no name
     // All of one, then all of the next.
-    const bool in_blocks = named && changes + 1 == values.size() && begins == changes;
-    constexpr std::size_t least_rows = 5;  // of each: what hardly comes again is a reading and no name
-    if (values.size() < 2 || values.size() > most || table.rows() < least_rows * values.size() ||
+    const bool in_blocks = named && changes + 1 == values.size() && begins == changes &&
+                           std::all_of(values.begin(), values.end(), [&](const std::string& value) {
+                             return std::count(key.begin(), key.end(), value) >= least_rows;
+                           });
+    if (values.size() < 2 || values.size() > most ||
+        static_cast<std::ptrdiff_t>(table.rows()) < least_rows * static_cast<std::ptrdiff_t>(values.size()) ||
         std::find(values.begin(), values.end(), "") != values.end() ||
         (!in_blocks && static_cast<double>(changes) < in_turn * static_cast<double>(table.rows())))
       continue;

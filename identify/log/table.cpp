@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string_view>
 
 #include "identify/log/median.hpp"
@@ -62,6 +64,29 @@ std::string from_latin_1(std::string_view text) {
       out += c;
     else
       out += {static_cast<char>(0xC0 | code >> 6), static_cast<char>(0x80 | (code & 0x3F))};
+  }
+  return out;
+}
+
+/// What spreadsheets call Unicode text, and a Windows shell writes: pairs of bytes, in the order of the mark that they
+/// begin with.
+std::string from_utf_16(std::string_view text) {
+  const bool low_first = text.starts_with("\xFF\xFE");
+  const auto unit = [&](std::size_t at) {
+    const auto first = static_cast<unsigned char>(text[at]), second = static_cast<unsigned char>(text[at + 1]);
+    return static_cast<std::uint32_t>(low_first ? second << 8 | first : first << 8 | second);
+  };
+  std::string out;
+  for (std::size_t at = 0; at + 1 < text.size(); at += 2) {
+    std::uint32_t code = unit(at);
+    if (code >= 0xD800 && code < 0xDC00 && at + 3 < text.size()) {  // of two pairs
+      at += 2;
+      code = 0x10000 + ((code & 0x3FF) << 10 | (unit(at) & 0x3FF));
+    }
+    const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;  // bytes behind the first
+    constexpr int marks[] = {0, 0xC0, 0xE0, 0xF0};
+    out += static_cast<char>(marks[more] | code >> 6 * more);
+    for (int k = more - 1; k >= 0; --k) out += static_cast<char>(0x80 | (code >> 6 * k & 0x3F));
   }
   return out;
 }
@@ -305,7 +330,37 @@ bool sets_thousands_apart(std::string_view cell) {
          left.find_first_not_of("+-0123456789.,") == std::string::npos;
 }
 
-void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line) {
+/// The cells of a column that are dates between strokes, read in either way.
+struct StrokedDates {
+  std::vector<std::size_t> rows;
+  std::vector<double> month_first_s, day_first_s;
+};
+
+/// A column of nothing but such dates in the order in which all are dates, and of two in which the log is shorter: its
+/// days follow each other.
+void read_dates(Table& table, std::size_t c, const StrokedDates& dates) {
+  if (dates.rows.size() != table.words[c].count() || count_told(table.columns[c]) > 0) return;
+  const auto lasts_s = [](const std::vector<double>& told_s) {
+    const auto [low, high] = std::minmax_element(told_s.begin(), told_s.end());
+    return std::any_of(told_s.begin(), told_s.end(), [](double t) { return std::isnan(t); }) ? missing : *high - *low;
+  };
+  const double month_first_s = lasts_s(dates.month_first_s), day_first_s = lasts_s(dates.day_first_s);
+  if (std::isnan(month_first_s) && std::isnan(day_first_s)) return;
+  const bool month_first = std::isnan(day_first_s) || month_first_s <= day_first_s;
+  for (std::size_t i = 0; i < dates.rows.size(); ++i)
+    table.columns[c][dates.rows[i]] = (month_first ? dates.month_first_s : dates.day_first_s)[i];
+  table.words[c] = {};
+  table.complaints[c].clear();
+  constexpr double day_s = 86400;
+  if (!std::isnan(month_first_s + day_first_s) && month_first_s != day_first_s)
+    table.notes.push_back(
+        fmt::format("Dates of column '{}' are read with the {} first, so that they span {:.3g} d and not {:.3g}.",
+                    table.names[c], month_first ? "month" : "day", std::min(month_first_s, day_first_s) / day_s,
+                    std::max(month_first_s, day_first_s) / day_s));
+}
+
+void add_row(Table& table, const std::vector<std::string_view>& cells, bool decimal_comma, int line,
+             std::map<std::size_t, StrokedDates>& dates) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const bool comma = cells[c].find(',') != std::string_view::npos;
     if (int& thousands = table.thousands[c]; thousands >= 0 && comma)
@@ -316,6 +371,11 @@ void add_row(Table& table, const std::vector<std::string_view>& cells, bool deci
       Words& words = table.words[c];
       const bool like_number = cells[c].find_first_of("0123456789") != std::string_view::npos;
       take(words, cells[c], table.rows());
+      if (double month_first_s = 0, day_first_s = 0; stroked_date(cells[c], month_first_s, day_first_s)) {
+        dates[c].rows.push_back(table.rows());
+        dates[c].month_first_s.push_back(month_first_s);
+        dates[c].day_first_s.push_back(day_first_s);
+      }
       if (!table.complaints[c].empty() && (words.like_numbers || !like_number)) {
         table.columns[c].push_back(missing);
         continue;
@@ -418,8 +478,7 @@ Table read_table(const std::string& path) {
   std::string text = whole_file(path);
   Table table;
   table.file = path;
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
-    refuse_line(table, 1, "the file is UTF-16; save it as UTF-8 text.");
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) text = from_utf_16(text);
   if (!is_utf8(text)) text = from_latin_1(text);
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');  // old Macintosh's
   if (text.starts_with("version https://git-lfs"))
@@ -434,6 +493,7 @@ Table read_table(const std::string& path) {
   }
   char separator = ',';
   std::vector<std::string_view> cells;
+  std::map<std::size_t, StrokedDates> dates;
   std::string_view remark;  // the last '#' line: some programs write the header there
   int lines = skip_preamble(rest), torn = 0, first_torn = 0, headers = 0;
   std::string what_is_torn;
@@ -491,7 +551,7 @@ Table read_table(const std::string& path) {
       else
         table.units = std::move(below);
     } else
-      add_row(table, cells, separator != ',', line);
+      add_row(table, cells, separator != ',', line, dates);
   }
   if (table.names.empty()) {
     refuse_data(path + ": the file is empty; record a log with a header line and rows.");
@@ -501,6 +561,7 @@ Table read_table(const std::string& path) {
   if (torn > 0)
     table.notes.push_back(fmt::format(
         "Lines that have not as many cells as the header were left out: {}, the first line {}.", torn, first_torn));
+  for (const auto& [column, told] : dates) read_dates(table, column, told);
   if (headers > 0) table.notes.push_back(fmt::format("Lines that repeat the header were left out: {}.", headers));
   if (table.rows() == 0) refuse_data(path + ": there is a header and no row; the recording failed: record it again.");
   return table;

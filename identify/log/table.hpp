@@ -3,7 +3,8 @@
 //
 //   in   a file: comma, semicolon, tab, blanks; quotes, and line ends in them; CRLF; byte-order mark; '#' lines,
 //        rows of empty cells before the header, or '#' before it as well; a row of units below it; decimal comma where
-//        no comma separates; times as ISO 8601, MATLAB and German loggers write them
+//        no comma separates; times as ISO 8601, MATLAB, spreadsheets and German loggers write
+//        them; UTF-8, UTF-16 and Latin-1
 //   out  names and columns of numbers, NaN where a cell is empty or says nan; a column of words (a date, a state) is a
 //        mistake only for who uses it
 //

@@ -58,20 +58,22 @@ const std::map<std::string, Unit>& units() {
 /// How loggers spell these too, in small letters and without blanks.
 const std::map<std::string, std::string>& spellings() {
   static const std::map<std::string, std::string> table = {
-      {"rpm", "rpm"},        {"1/min", "rpm"},     {"min-1", "rpm"}, {"min^-1", "rpm"},      {"u/min", "rpm"},
-      {"r/min", "rpm"},      {"rev/min", "rpm"},   {"rps", "rev/s"}, {"rad/sec", "rad/s"},   {"rads-1", "rad/s"},
-      {"rad*s^-1", "rad/s"}, {"deg/sec", "deg/s"}, {"amp", "A"},     {"amps", "A"},          {"ampere", "A"},
-      {"amperes", "A"},      {"mamp", "mA"},       {"mamps", "mA"},  {"milliamps", "mA"},    {"watt", "W"},
-      {"watts", "W"},        {"sec", "s"},         {"secs", "s"},    {"second", "s"},        {"seconds", "s"},
-      {"ms", "ms"},          {"us", "us"},         {"ns", "ns"},     {"msec", "ms"},         {"usec", "us"},
-      {"nsec", "ns"},        {"minutes", "min"},   {"hours", "h"},   {"days", "d"},          {"kelvin", "K"},
-      {"degc", "degC"},      {"celsius", "degC"},  {"degf", "degF"}, {"fahrenheit", "degF"}, {"nm", "Nm"},
-      {"n·m", "Nm"},         {"n*m", "Nm"},        {"n.m", "Nm"},    {"ohms", "ohm"},        {"°c", "degC"},
-      {"ºc", "degC"},        {"°f", "degF"},       {"ºf", "degF"},  // º: the sign of an ordinal
-      {"rad_s", "rad/s"},    {"deg_s", "deg/s"},   {"dps", "deg/s"}, {"deg_c", "degC"},      {"deg_f", "degF"},
-      {"turn/s", "rev/s"},   {"turns/s", "rev/s"}, {"hz", "Hz"},                      // as programs write
-      {"℃", "degC"},         {"℉", "degF"},        {"µs", "us"},     {"μs", "us"},    // the sign micro, the letter mu
-      {"Ω", "ohm"},          {"mΩ", "mohm"},       {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter, the sign ohm
+      {"rpm", "rpm"},         {"1/min", "rpm"},       {"min-1", "rpm"}, {"min^-1", "rpm"},      {"u/min", "rpm"},
+      {"r/min", "rpm"},       {"rev/min", "rpm"},     {"rps", "rev/s"}, {"rad/sec", "rad/s"},   {"rads-1", "rad/s"},
+      {"rad*s^-1", "rad/s"},  {"deg/sec", "deg/s"},   {"amp", "A"},     {"amps", "A"},          {"ampere", "A"},
+      {"amperes", "A"},       {"mamp", "mA"},         {"mamps", "mA"},  {"milliamps", "mA"},    {"watt", "W"},
+      {"watts", "W"},         {"sec", "s"},           {"secs", "s"},    {"second", "s"},        {"seconds", "s"},
+      {"ms", "ms"},           {"us", "us"},           {"ns", "ns"},     {"msec", "ms"},         {"usec", "us"},
+      {"nsec", "ns"},         {"minutes", "min"},     {"hours", "h"},   {"days", "d"},          {"kelvin", "K"},
+      {"degc", "degC"},       {"celsius", "degC"},    {"degf", "degF"}, {"fahrenheit", "degF"}, {"nm", "Nm"},
+      {"n·m", "Nm"},          {"n*m", "Nm"},          {"n.m", "Nm"},    {"ohms", "ohm"},        {"°c", "degC"},
+      {"ºc", "degC"},         {"°f", "degF"},         {"ºf", "degF"},  // º: the sign of an ordinal
+      {"rad_s", "rad/s"},     {"deg_s", "deg/s"},     {"dps", "deg/s"}, {"deg_c", "degC"},      {"deg_f", "degF"},
+      {"turn/s", "rev/s"},    {"turns/s", "rev/s"},   {"hz", "Hz"},                    // as programs write
+      {"℃", "degC"},          {"℉", "degF"},          {"µs", "us"},     {"μs", "us"},  // the sign micro, the letter mu
+      {"Ω", "ohm"},           {"mΩ", "mohm"},         {"Ω", "ohm"},     {"mΩ", "mohm"},  // the letter, the sign ohm
+      {"nmm", "mNm"},         {"n.mm", "mNm"},        {"n·mm", "mNm"},  {"rad.s-1", "rad/s"},   {"radpersec", "rad/s"},
+      {"degpersec", "deg/s"}, {"rotpersec", "rev/s"},
   };
   return table;
 }

@@ -196,6 +196,20 @@ TEST(Reader, DegreesInLatin1AreDegrees) {
   EXPECT_NEAR(logs[0].of(Role::housing)[1], 100, 1e-9);
 }
 
+TEST(Reader, Utf16InEitherOrderOfBytesIsRead) {
+  ColumnMap map;
+  add_column(map, "housing_degC=Gehäuse °F \U0001F321");
+  std::u16string text = u"time_s;current_A;Gehäuse °F \U0001F321\r\n0;1;50\r\n1;2;212\r\n";
+  for (const bool low_first : {true, false}) {
+    std::string bytes = low_first ? "\xFF\xFE" : "\xFE\xFF";
+    for (const char16_t unit : text) {
+      const char high = static_cast<char>(unit >> 8), low = static_cast<char>(unit & 0xFF);
+      bytes += {low_first ? low : high, low_first ? high : low};
+    }
+    EXPECT_DOUBLE_EQ(read(bytes, map)[0].of(Role::housing)[1], 212);
+  }
+}
+
 TEST(Reader, AUnitInAMappedColumnsNameIsObeyedUnlessOneWasSaid) {
   const std::string rows = "\n0,1000,50,60\n1500,2000,212,60\n";
   const std::string text = "Time (ms),Current [mA],T_body degF,n (rpm)" + rows;
@@ -409,6 +423,23 @@ TEST(Reader, ASensorThatReadsNothingButMinusOneIsLeftOut) {
   EXPECT_TRUE(read("time_s,current_A,housing_degC,ambient_degC\n0,1,20,0\n1,2,21,\n2,2,21,9\n")[0].has(Role::ambient));
 }
 
+TEST(Reader, ASensorThatIsOpenIsLeftOutAndIfItIsTheOnlyOneSaidToBe) {
+  // As VESC tells a motor without a thermistor.
+  const std::string rows = "0,1,-75.2,20\n1,2,-74.1,21\n2,2,-76,22\n";
+  const Log log = read("time_s,current_A,housing_degC,core_degC\n" + rows)[0];
+  EXPECT_FALSE(log.has(Role::housing));
+  EXPECT_TRUE(log.has(Role::core));
+  says(log.notes.at(0),
+       "housing_degC is below -45 in all rows, as of a sensor that is not connected, and was left out.");
+  ColumnMap map;
+  add_column(map, "housing_degC=temp_motor");
+  says(complaint("time_s,current_A,temp_motor,temp_mos\n" + rows, map),
+       "column 'temp_motor' is below -45 in all rows, as of a sensor that is not connected; connect it and record the "
+       "log again, or map another as housing_degC.");
+  says(complaint(head + "0,1,0\n1,2,0\n"), "column 'housing_degC' is 0 in all rows, as of a sensor that is not");
+  EXPECT_TRUE(read(head + "0,1,-75\n1,2,-40\n")[0].has(Role::housing));
+}
+
 TEST(Reader, AMeterThatReadsNothingButZeroDoesNotHideAnother) {
   const auto power = read("time_s,current_A,power_W,housing_degC\n0,1,0,20\n1,2,0,21\n")[0];
   EXPECT_FALSE(power.has(Role::power));
@@ -492,6 +523,14 @@ TEST(Reader, RowsThatShareAWholeSecondAreSpreadOverIt) {
   says(log.notes[0], "About 10 rows share each time; they are spread over the 1 s to the next.");
 }
 
+TEST(Reader, TwoRowsASecondAreSpreadWhereSomeAreMissing) {
+  std::string text = head;
+  for (int i = 0; i < 20; ++i) text += i == 7 ? "" : fmt::format("{},{},{}\n", i / 2, i, 20 + i);
+  const Log log = read(text)[0];
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(log.of(Role::time)[18], 9.5);
+}
+
 TEST(Reader, RowsInBurstsAreNotTakenForRowsThatAreMissing) {
   const auto period_s = [](auto time_of) {
     std::vector<double> t;
@@ -530,7 +569,7 @@ TEST(Reader, ADateInAnotherFormIsAnsweredWithTheFormsThatAreRead) {
       " is not a number, nor a time as it is read (12.5, 08:15:30, 1:05.3, 2026-11-21 08:15:30, "
       "2026-11-21T08:15:30.5+01:00, 21.11.2026 08:15:30, 21-Nov-2026 08:15:30, 11/21/2026 08:15:30 AM; "
       "--period S does without); repair it";
-  for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "12/31/2025 10:00:00",
+  for (const char* date : {"31.12.2025", "31.13.2025 10:00:00", "31-Foo-2025 10:00:00", "13/31/2025 10:00:00",
                            "13.5:00 AM", "8:15 PM", "2025-06-01", "Dec 31 10:00:00 2025"})
     says(complaint(head + date + ",1,20\n"), forms);
   for (const char* time :
@@ -741,6 +780,13 @@ TEST(Rows, OfMotorsOneAfterTheOtherOrOfAWholeRobotAreRefusedAsWell) {
   says(complaint(robot), "several motors in turn, as column 'joint' tells (0, 1, 10");
 }
 
+TEST(Rows, WhatAMotorDidInOneRowBeforeTheClockBeganIsNoNameOfOne) {
+  // As a thrust stand's summary above its table.
+  std::string text = "time_s,current_A,housing_degC,Motor Efficiency (%)\n0.07,1,20,30.6\n";
+  for (int i = 0; i < 30; ++i) text += fmt::format("{},{},{},32.4\n", i, i % 3, 20 + i);
+  EXPECT_EQ(read(text)[0].of(Role::time).size(), 31u);
+}
+
 TEST(Rows, ACounterOfMessagesOrABitThatTogglesIsNoMotor) {
   std::string toggles = "time_s,current_A,housing_degC,alive\n", kinds = "time_s,current_A,housing_degC,id\n";
   for (int i = 0; i < 40; ++i) {
@@ -819,8 +865,7 @@ TEST(Reader, DatesAreReadInEachFormThatCannotBeAnother) {
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 AM,1,20\n12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11:59:30 PM,1,20\n12:00:30 AM,1,21\n")[0].of(Role::time)[1], 60);
   EXPECT_DOUBLE_EQ(read(head + "11/20/2026 11:59:30 AM,1,20\n11/20/2026 12:00:30 PM,1,21\n")[0].of(Role::time)[1], 60);
-  for (const char* either :
-       {"11/20/2026 08:15:30", "21-11-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
+  for (const char* either : {"21-21-2026 08:15:30", "2026.11.21 08:15:30", "2026-13-21 08:15:30"})
     says(complaint(head + either + ",1,20\n"), "nor a time as it is read");
 }
 
@@ -887,6 +932,49 @@ TEST(Reader, AColumnCalledTimeIsTheTime) {
   EXPECT_DOUBLE_EQ(read("start_s,t_s,current_A,housing_degC\n9,0,1,20\n9,5,2,21\n")[0].of(Role::time)[1], 5);
   EXPECT_DOUBLE_EQ(read("timestamp_ms,current_A,housing_degC\n0,1,20\n500,2,21\n")[0].of(Role::time)[1], 0.5);
   says(complaint("time,t,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
+}
+
+TEST(Reader, ATimeThatFewLoggersCallSoIsTheTimeWhereNoColumnIsCalledTime) {
+  for (const char* name : {"Seconds", "ts", "X_Value", ":Time"})
+    EXPECT_DOUBLE_EQ(read(std::string(name) + ",current_A,housing_degC\n0,1,20\n5,2,21\n")[0].of(Role::time)[1], 5);
+  EXPECT_DOUBLE_EQ(read("TimeUS,current_A,housing_degC\n0,1,20\n500000,2,21\n")[0].of(Role::time)[1], 0.5);
+  EXPECT_DOUBLE_EQ(read("Seconds,time,current_A,housing_degC\n9,0,1,20\n9,5,2,21\n")[0].of(Role::time)[1], 5);
+  says(complaint("seconds,ts,current_A,housing_degC\n0,0,1,20\n1,1,1,21\n"), "a time column is missing");
+}
+
+TEST(Reader, DatesBetweenStrokesAreReadInTheOrderInWhichTheirDaysFollowEachOther) {
+  // As spreadsheets write them in America and in Britain, and Keysight's recorders.
+  const auto log = [](const std::string& first, const std::string& last) {
+    return read("Time,current_A,housing_degC\n" + first + ",1,20\n" + last + ",2,21\n")[0];
+  };
+  EXPECT_DOUBLE_EQ(log("1/8/2026 17:30", "1/8/2026 17:31").of(Role::time)[1], 60);
+  EXPECT_DOUBLE_EQ(log("01/08/2026 17:30:00:250", "01/08/2026 17:30:00:500").of(Role::time)[1], 0.25);
+  EXPECT_DOUBLE_EQ(log("31-12-2026 23:59:59", "01-01-2027 00:00:01").of(Role::time)[1], 2);
+  EXPECT_DOUBLE_EQ(log("12/31/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
+  EXPECT_DOUBLE_EQ(log("31/12/2026 23:59:59", "1/1/2027 00:00:01").of(Role::time)[1], 2);
+  const Log months = log("1/8/2026 23:59:59", "1/9/2026 00:00:01"),
+            days = log("8/1/2026 23:59:59", "9/1/2026 00:00:01");
+  EXPECT_DOUBLE_EQ(months.of(Role::time)[1], 2);
+  EXPECT_DOUBLE_EQ(days.of(Role::time)[1], 2);
+  says(months.notes.at(0),
+       "Dates of column 'Time' are read with the month first, so that they span 2.31e-05 d and not 30.");
+  says(days.notes.at(0), "with the day first");
+  says(complaint("Time,current_A,housing_degC\n13/31/2026 17:30,1,20\n13/31/2026 17:31,2,21\n"), "nor a time as it is");
+}
+
+TEST(Reader, ADateBesideATimeOfDayTellsItsDay) {
+  // As radios and spreadsheets write them; the second row is thirty hours after the first.
+  const auto log = [](const std::string& first, const std::string& last) {
+    return read("Date,Time,current_A,housing_degC\n" + first + ",20:00:00.5,1,20\n" + last + ",02:00:01,2,21\n")[0];
+  };
+  for (const auto& [first, last] : {std::pair("2026-11-21", "2026-11-23"), std::pair("21.11.2026", "23.11.2026")})
+    EXPECT_NEAR(log(first, last).of(Role::time)[1], 30 * 3600 + 0.5, 1e-6);
+  says(log("2026-11-21", "2026-11-23").notes.at(1), "Column 'Date' tells the day of 'Time'.");
+  for (const auto& [first, last] : {std::pair("1/2/2026", "3/2/2026"), std::pair("2/1/2026", "2/3/2026")})
+    EXPECT_NEAR(log(first, last).of(Role::time)[1], 30 * 3600 + 0.5, 1e-6);
+  says(complaint("Date,current_A,housing_degC\n1/2/2026,1,20\n1/2/2026,2,21\n"), "a time column is missing");
+  EXPECT_DOUBLE_EQ(
+      read("date,time_s,current_A,housing_degC\n2026-11-21,0,1,20\n2026-11-22,5,2,21\n")[0].of(Role::time)[1], 5);
 }
 
 TEST(Reader, AllThatIsMissingIsNamedAtOnceWithWhatItMayBe) {
@@ -984,6 +1072,37 @@ TEST(Reader, WhatHeatsAControllerOrFeedsItIsNoGuess) {
   says(talon, "--column current_A=StatorCurrent");
   says(talon, "--column housing_degC=DeviceTemp");
   says(complaint("time_s,Iq_setpoint,Iq_measured,temp\n0,1,1,20\n1,2,2,21\n"), "--column iq_A=Iq_measured");
+}
+
+TEST(Reader, CountsAndTheSpeedOfASatelliteReceiverAreNoGuess) {
+  const std::string raw = complaint("time_s,motor_current_raw,iq,motor_temp\n0,100,1,20\n1,200,2,21\n");
+  says(raw, "--column iq_A=iq");
+  const std::string wheel = complaint("time_s,gps_speed,speed,phase_current,motor_temp\n0,0,1,1,20\n1,5,2,2,21\n");
+  says(wheel, "--column speed_rad_per_s=speed ");
+  says(complaint("time_s,actual_current_0,actual_qd_0,joint_temp_0\n0,1,1,20\n1,2,2,21\n"),
+       "--column speed_rad_per_s=actual_qd_0");
+}
+
+TEST(Reader, AChannelWhoseUnitAloneTellsWhatItIsIsProposedWhereNoNameDoes) {
+  const std::string recorder = complaint("Time,1-1[A],1-2[C],1-3[V]\n0,1,20,5\n1,2,21,5\n");
+  says(recorder, "--column current_A=\"1-1[A]\" if it is the motor's own current");
+  says(recorder, "--column housing_degC=\"1-2[C]\"");
+  const std::string supply = complaint("Time,batt [A],esc [C]\n0,1,20\n1,2,21\n");
+  says(supply, "--column current_A=NAME");
+  says(supply, "--column housing_degC=NAME");
+}
+
+TEST(Reader, AMotorsTemperatureAndARoomsAreKnownByWhatFewCallThem) {
+  for (const char* name : {"tmpm", "Tmot", "t_mot", "temperature_motor"})  // OpenInverter's, and Kinova's
+    says(complaint(fmt::format("time_s,iq_A,temperature_core,tmp,{}\n0,1,30,1,20\n1,2,31,2,21\n", name)),
+         fmt::format("--column housing_degC={}.", name));
+  for (const char* name : {"T_amb", "Tamb", "temp_amb"})
+    says(complaint(fmt::format("time_s,iq_A,motor_temp,{}\n0,1,20,20\n1,2,21,20\n", name)),
+         fmt::format("--column ambient_degC={}.", name));
+  for (const char* name : {"I_phase", "I_mot"})
+    says(complaint(fmt::format("time_s,I_bat,{},motor_temp\n0,1,1,20\n1,2,2,21\n", name)),
+         fmt::format("--column current_A={};", name));
+  says(complaint("TimeString;VarName;VarValue\n0;I;1\n0;T;20\n"), "each row has one value ('VarValue')");
 }
 
 TEST(Reader, OfThousandsOfColumnsTheFirstHundredAreNamed) {
@@ -1129,6 +1248,18 @@ TEST(Reader, AControllersTemperatureThatWasMappedIsSaidToBeOne) {
     EXPECT_EQ(notes_of(name).find("drives"), std::string::npos) << name;
 }
 
+TEST(Reader, OfATemperatureThatMayBeTheDrivesOwnItIsSaid) {
+  const auto notes_of = [](const std::string& name) {
+    ColumnMap map;
+    add_column(map, "housing_degC=" + name);
+    return fmt::format("{}", fmt::join(read("time_s,current_A," + name + "\n0,1,20\n1,2,21\n", map)[0].notes, " "));
+  };
+  for (const char* name : {"temperature", "Present Temperature (°C)", "system_temp", "temp_c"})
+    says(notes_of(name), "does not tell what it is the temperature of");
+  for (const char* name : {"motor_temperature", "T_case", "Tmp1", "temperature_stator"})
+    EXPECT_EQ(notes_of(name).find("does not tell"), std::string::npos) << name;
+}
+
 TEST(Reader, ATemperatureCalledAsOfAnotherMotorIsSaidToBe) {
   const auto notes_with = [](const std::string& housing) {
     ColumnMap map;
@@ -1242,6 +1373,12 @@ TEST(Reader, AMappedColumnThatIsNotThereIsNamedWithTheNearest) {
   identify::add_column(map, "housing_degC=T_bodi");
   says(complaint("time_s,current_A,T_body\n0,1,20\n", map, 2), "did you mean 'T_body'?");
 }
+TEST(Reader, AColumnsNameMayBeginWithAColon) {
+  ColumnMap map;
+  identify::add_column(map, "housing_degC=:Motor");
+  EXPECT_DOUBLE_EQ(read("time_s,current_A,:Motor\n0,1,20\n1,1,21\n", map)[0].of(Role::housing)[1], 21);
+}
+
 TEST(Reader, AColumnsNameMayHoldAColon) {
   ColumnMap map;
   identify::add_column(map, "housing_degC=T:case");
@@ -1454,7 +1591,10 @@ TEST(Map, UnitsAreKnownAsLoggersSpellThem) {
   EXPECT_NEAR(factor("speed_rad_per_s", "rev/s"), 6.283185307, 1e-9);
   for (const char* turns : {"turns/s", "turn/s"}) EXPECT_EQ(factor("speed_rad_per_s", turns), 2 * M_PI);
   for (const char* deg : {"deg_s", "dps"}) EXPECT_EQ(factor("speed_rad_per_s", deg), M_PI / 180);
-  EXPECT_EQ(factor("speed_rad_per_s", "rad_s"), 1);
+  EXPECT_EQ(identify::unit_in_name("/Drive/VelocityRadPerSec", "speed_rad_per_s"), "RadPerSec");
+  EXPECT_EQ(factor("speed_rad_per_s", "RotPerSec"), 2 * M_PI);
+  for (const char* rad : {"rad_s", "rad.s-1"}) EXPECT_EQ(factor("speed_rad_per_s", rad), 1);
+  for (const char* mNm : {"N.mm", "Nmm", "N·mm"}) EXPECT_EQ(factor("torque_Nm", mNm), 1e-3);
   EXPECT_EQ(factor("current_A", "ma"), 1e-3);
   EXPECT_EQ(factor("time_s", "ns"), 1e-9);
   for (const char* us : {"us", "µs", "μs"}) EXPECT_EQ(factor("time_s", us), 1e-6);
