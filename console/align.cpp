@@ -18,13 +18,13 @@ namespace console {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double interval_s = 0.002;  // of setpoints; a light shaft gains its speed within a few of them
+constexpr double push_interval_s = 0.002;  // of setpoints; a light shaft gains its speed within a few of them
 constexpr double telemetry_Hz = 1000;
 constexpr int directions = 12;     // friction bends the answer, evenly spaced ones do not turn by it
 constexpr double sure_rad = 0.03;  // one sigma: of the torque a thousandth
 constexpr double turn = 1.1;       // of the shaft, to meet the encoder's index for certain
 constexpr double longest_turn_s = 30;
-constexpr double first_push_s = 0.02, longest_push_s = 0.3, rest_s = 0.05;
+constexpr double first_push_s = 0.02, longest_push_s = 0.3, coast_s = 0.05;
 constexpr double learn_s = 0.5;  // more than twice what a board needs to learn its current sensors' offsets
 constexpr double first_share = 0.05, louder = 1.5;  // of the most that may flow
 // Back-EMF of the magnet where it is not believed to be: twice this is less than firmware/watch.hpp lets pass.
@@ -72,7 +72,7 @@ class Shaft {
       const double speed_rad_per_s = std::fabs(step(current_A, angle_rad));
       if (speed_rad_per_s > std::max(fastest_rad_per_s_, last_rad_per_s)) break;
       last_rad_per_s = speed_rad_per_s;
-      session_.wait_until(std::min(session_.now_s() + interval_s, start_s + seconds));
+      session_.wait_until(std::min(session_.now_s() + push_interval_s, start_s + seconds));
     }
     return session_.now_s() - start_s;
   }
@@ -80,7 +80,7 @@ class Shaft {
   /// Turns once round, back, and stands. False: it does not.
   bool turn_round(double most_A, const Alignment::Found& found) {
     const double forward_rad = pi / 2 - found.ahead_rad;
-    const double A_s_per_rad = 0.2 / (found.rad_per_s2_A * interval_s);  // slow beside setpoints
+    const double A_s_per_rad = 0.2 / (found.rad_per_s2_A * push_interval_s);  // slow beside setpoints
     double speed_rad_per_s = 0, friction_A = 0;
     for (const double towards : {1.0, -1.0, 0.0}) {
       const double wish_rad_per_s = 0.5 * towards * fastest_rad_per_s_, start_s = session_.now_s();
@@ -93,7 +93,7 @@ class Shaft {
         const double slow_rad_per_s = wish_rad_per_s - speed_rad_per_s;
         friction_A = std::clamp(friction_A + 0.05 * A_s_per_rad * slow_rad_per_s, -most_A, most_A);
         speed_rad_per_s = step(std::clamp(A_s_per_rad * slow_rad_per_s + friction_A, -most_A, most_A), forward_rad);
-        session_.wait_until(session_.now_s() + interval_s);
+        session_.wait_until(session_.now_s() + push_interval_s);
         turned_rad += speed_rad_per_s * (session_.now_s() - last_s);
         last_s = session_.now_s();
         if (last_s - start_s > longest_turn_s) return false;
@@ -110,7 +110,7 @@ class Shaft {
       const double pushed_s = push(current_A, angle_rad, seconds);
       const double back_s = push(-current_A, angle_rad, 2 * pushed_s);
       push(current_A, angle_rad, back_s - pushed_s);
-      push(0, 0, rest_s);
+      push(0, 0, coast_s);
     }
   }
 
