@@ -198,7 +198,8 @@ bool ProfileRun::go_on(const CoreEstimator& core, int most_steps) {
     const Piece& piece = pieces_[piece_];
     const double left_s = static_cast<double>(piece.seconds) - done_s_, from_s = walk_.time_s;
     if (left_s > 0.0) {
-      const HeatInput<> input = future_input(core, piece.current_A, shares_);
+      HeatInput<> input = future_input(core, piece.current_A, shares_);
+      input[Drive::speed_to_0_8] = 0.0;  // what turns now may stand then
       done_s_ += step_walk(walk_, core, core.transition(), input, left_s);
       const double until_s = std::fmin(walk_.time_s, static_cast<double>(walk_.forecast.limits_after_s));
       if (until_s > from_s) before_As_ += (until_s - from_s) * static_cast<double>(std::abs(piece.current_A));

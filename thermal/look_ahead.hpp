@@ -69,7 +69,7 @@ class LookAhead {
 };
 
 /// A profile played in slices, in the estimator's own steps of 10 ms. The estimator may step on in between: the run
-/// began at its temperatures and keeps its own.
+/// began at its temperatures and keeps its own. Heat by speed goes on as it is, cooling by speed is not counted on.
 class ProfileRun {
  public:
   static constexpr int most_pieces = 16;
