@@ -175,6 +175,13 @@ class Axis {
   /// Every 4 ms: a step of how long the load may go on. Changes nothing but what is said.
   void look_ahead();
 
+  /// A question about this axis, as ProfileRun::begin. What samples do not show of the heat now goes on as it is; of an
+  /// axis at rest nobody knows it.
+  bool ask(thermal::ProfileRun& run, const thermal::Piece* pieces, int count,
+           const thermal::PhaseShares& shares) const {
+    return run.begin(core_, pieces, count, shares, state_.unseen.of_heat_A2);
+  }
+
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }
   const thermal::CoreEstimator& core() const { return core_; }

@@ -145,8 +145,7 @@ void Link::look_ahead() {
                   sizeof segment);
       pieces[i] = {segment.seconds, segment.current_A};
     }
-    if (!profile_.begin(core, pieces, count, shares))
-      return finish(wire::refused(wire::Status::out_of_range, ask.axis));
+    if (!axis.ask(profile_, pieces, count, shares)) return finish(wire::refused(wire::Status::out_of_range, ask.axis));
     looking_ahead_ = true;
     return;
   }
