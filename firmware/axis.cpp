@@ -580,8 +580,9 @@ void Axis::publish() {
   state.unseen = unseen_;
   state.heating_A = static_cast<float>(wire::direct_per_amplitude * std::sqrt(input_[thermal::Drive::current_A2]));
   state.allowance_A = allowance_.current_A;
-  state.time_left_s = endurance_.seconds_left();
-  state.allowance_1s_A = endurance_.current_A();
+  // Of a winding that nobody described there is a network all the same, one that nothing warms.
+  state.time_left_s = configured_ ? endurance_.seconds_left() : 0.0f;
+  state.allowance_1s_A = configured_ ? endurance_.current_A() : 0.0f;
   state.limit = state.fast.limit;
   state.estimate_flags = now.flags;
   state.fault = fault();

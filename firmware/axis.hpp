@@ -78,7 +78,7 @@ struct AxisState {
   float heating_A = 0.0f;       // direct, through two terminals: heats as the phases did, ripple included
   float allowance_A = 0.0f;     // amplitude, the smallest of core, board and what blindness leaves
   float time_left_s = 0.0f;     // that what flows may go on until the core's limit; +infinity beyond half a minute
-  float allowance_1s_A = 0.0f;  // amplitude that the core bears for the next second; both 0 where they would be old
+  float allowance_1s_A = 0.0f;  // amplitude that the core bears for the next second; both 0 where old, or unset
   wire::Limit limit = wire::Limit::none;  // what holds the output back, exactly one
   std::uint32_t estimate_flags = 0;       // thermal::EstimateFlag
   FaultRecord fault;
@@ -169,10 +169,19 @@ class Axis {
   /// Where a signal of axis.signals lies; empty if there is no such id.
   SignalPlace signal(std::uint8_t id) const;
   bool offset_known() const { return offsets_.known(); }
+  /// Its parameters are complete and valid.
+  bool configured() const { return configured_; }
   const Abc& current_offset_A() const { return offsets_.offset_A(); }
 
   /// Every 4 ms: a step of how long the load may go on. Changes nothing but what is said.
   void look_ahead();
+
+  /// A question about this axis, as ProfileRun::begin. What samples do not show of the heat now goes on as it is; of an
+  /// axis at rest nobody knows it.
+  bool ask(thermal::ProfileRun& run, const thermal::Piece* pieces, int count,
+           const thermal::PhaseShares& shares) const {
+    return run.begin(core_, pieces, count, shares, state_.unseen.of_heat_A2);
+  }
 
   /// As of the last slow tick.
   const AxisState& state() const { return state_; }

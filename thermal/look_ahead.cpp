@@ -175,7 +175,8 @@ float LookAhead::current_for_A(const CoreEstimator& core, float seconds, float m
   return good_A;
 }
 
-bool ProfileRun::begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares) {
+bool ProfileRun::begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares,
+                       float ripple_A2) {
   if (count < 1 || count > most_pieces) return false;
   float whole_s = 0.0f;
   asked_As_ = before_As_ = done_s_ = 0.0;
@@ -189,6 +190,7 @@ bool ProfileRun::begin(const CoreEstimator& core, const Piece* pieces, int count
   count_ = count;
   piece_ = 0;
   shares_ = shares;
+  ripple_A2_ = ripple_A2 <= 0.0f ? 0.0 : static_cast<double>(ripple_A2);  // NaN stays: it is not feasible
   walk_ = begin_at(core);
   return true;
 }
@@ -198,7 +200,10 @@ bool ProfileRun::go_on(const CoreEstimator& core, int most_steps) {
     const Piece& piece = pieces_[piece_];
     const double left_s = static_cast<double>(piece.seconds) - done_s_, from_s = walk_.time_s;
     if (left_s > 0.0) {
-      const HeatInput<> input = future_input(core, piece.current_A, shares_);
+      HeatInput<> input = future_input(core, piece.current_A, shares_);
+      input[Drive::speed_to_0_8] = 0.0;  // what turns now may stand then
+      for (int k = 0; k < 3; ++k) input[phase_drive(k)] += 0.5 * ripple_A2_;
+      input[Drive::current_A2] += ripple_A2_;
       done_s_ += step_walk(walk_, core, core.transition(), input, left_s);
       const double until_s = std::fmin(walk_.time_s, static_cast<double>(walk_.forecast.limits_after_s));
       if (until_s > from_s) before_As_ += (until_s - from_s) * static_cast<double>(std::abs(piece.current_A));

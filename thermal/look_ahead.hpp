@@ -69,14 +69,16 @@ class LookAhead {
 };
 
 /// A profile played in slices, in the estimator's own steps of 10 ms. The estimator may step on in between: the run
-/// began at its temperatures and keeps its own.
+/// began at its temperatures and keeps its own. Heat by speed goes on as it is, cooling by speed is not counted on.
 class ProfileRun {
  public:
   static constexpr int most_pieces = 16;
   static constexpr float most_s = 60.0f;
 
-  /// False: no piece, a piece that is not one, or longer than most_s.
-  bool begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares);
+  /// False: no piece, a piece that is not one, or longer than most_s. ripple_A2: of |i|^2, what heats now whatever
+  /// flows, and will then.
+  bool begin(const CoreEstimator& core, const Piece* pieces, int count, const PhaseShares& shares,
+             float ripple_A2 = 0.0f);
   /// Up to so many steps; true: played to its end.
   bool go_on(const CoreEstimator& core, int most_steps);
 
@@ -89,6 +91,7 @@ class ProfileRun {
   Walk walk_;
   Piece pieces_[most_pieces]{};
   PhaseShares shares_{};
+  double ripple_A2_ = 0.0;
   int count_ = 0, piece_ = 0;
   double done_s_ = 0.0;  // of the present piece
   double asked_As_ = 0.0, before_As_ = 0.0;

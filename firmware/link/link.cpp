@@ -129,8 +129,10 @@ void Link::look_ahead() {
   wire::Ask ask{};
   std::memcpy(&ask, errand_payload_, sizeof ask);
   if (ask.axis >= axis_count) return finish(wire::refused(wire::Status::no_such_axis, ask.axis));
-  const thermal::CoreEstimator& core = commands_.driver().axis(ask.axis).core();
+  const Axis& axis = commands_.driver().axis(ask.axis);
+  const thermal::CoreEstimator& core = axis.core();
   if (!looking_ahead_) {
+    if (!axis.configured()) return finish(wire::refused(wire::Status::parameters_unset, ask.axis));
     constexpr float standing = 1.0f, turning = 0.5f;  // mean(i_k^2) / |i|^2
     const float share = ask.standing != 0 ? standing : turning;
     const thermal::PhaseShares shares{{share, share, share}};
@@ -143,8 +145,7 @@ void Link::look_ahead() {
                   sizeof segment);
       pieces[i] = {segment.seconds, segment.current_A};
     }
-    if (!profile_.begin(core, pieces, count, shares))
-      return finish(wire::refused(wire::Status::out_of_range, ask.axis));
+    if (!axis.ask(profile_, pieces, count, shares)) return finish(wire::refused(wire::Status::out_of_range, ask.axis));
     looking_ahead_ = true;
     return;
   }

@@ -19,8 +19,12 @@ char* next_word(char*& at) {
   return word;
 }
 
-/// -12.34; false for anything else.
+constexpr char too_many[] = "this command has fewer words; try: help\r\n";
+
+/// -12.34; false for anything else. Digits behind the point that change no float are passed over: they would make
+/// infinity over infinity of a number.
 bool number(const char* text, float& value) {
+  constexpr float whole_enough = 1e9f, unit_enough = 1e30f;
   const bool negative = *text == '-';
   if (negative) ++text;
   float whole = 0.0f, unit = 1.0f;
@@ -32,6 +36,7 @@ bool number(const char* text, float& value) {
     }
     if (*text < '0' || *text > '9') return false;
     digits = true;
+    if (point && (whole >= whole_enough || unit >= unit_enough)) continue;
     whole = whole * 10.0f + static_cast<float>(*text - '0');
     if (point) unit *= 10.0f;
   }
@@ -88,30 +93,35 @@ std::size_t TextPort::give(std::uint8_t* out, std::size_t room) {
 void TextPort::obey(char* line) {
   const char* const verb = next_word(line);
   const auto is = [verb](const char* word) { return std::strcmp(verb, word) == 0; };
+  const auto more = [&line] { return *next_word(line) != 0; };
   if (is("help")) return help();
   if (is("state")) return state();
   if (is("get")) {
     const char* const name = next_word(line);
-    return get(name, next_word(line));
+    const char* const axis = next_word(line);
+    return more() ? say(too_many) : get(name, axis);
   }
   if (is("set")) {
     const char* const name = next_word(line);
     const char* const value = next_word(line);
-    return set(name, value, next_word(line));
+    const char* const axis = next_word(line);
+    return more() ? say(too_many) : set(name, value, axis);
   }
-  if (is("save")) return save();
+  if (is("save")) return more() ? say(too_many) : save();
   int i = 0;
   const bool commands_axis = is("arm") || is("disarm") || is("clear") || is("mode") || is("iq") || is("torque");
   if (!commands_axis) return say("unknown command; try: help\r\n");
   if (!axis_number(next_word(line), i)) return say("name axis 0 or 1\r\n");
   Axis& axis = commands_.driver().axis(i);
-  if (is("arm")) return say(link_.parameters_free() ? axis.arm() : wire::Status::busy);
-  if (is("clear")) return say(axis.clear());
   if (is("disarm")) {
     axis.disarm();
-    return say(wire::Status::done);
+    return more() ? say("this axis alone, one a line\r\n") : say(wire::Status::done);
   }
-  const char* const word = next_word(line);
+  const bool has_word = is("mode") || is("iq") || is("torque");
+  const char* const word = has_word ? next_word(line) : "";
+  if (more()) return say(too_many);
+  if (is("arm")) return say(link_.parameters_free() ? axis.arm() : wire::Status::busy);
+  if (is("clear")) return say(axis.clear());
   if (is("mode")) {
     for (const wire::ControlMode mode : {wire::ControlMode::current, wire::ControlMode::torque})
       if (std::strcmp(word, wire::text_of(mode)) == 0) return say(axis.choose(mode));

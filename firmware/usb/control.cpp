@@ -133,8 +133,16 @@ Order Control::standard(const Setup& s) {
     default:  // set_interface: there is but one alternate setting
       if (!configured_ || s.index >= interface_count) return Order::refuse;
       argument_ = static_cast<std::uint8_t>(s.index);
+      halted_ &= static_cast<std::uint16_t>(~halts_of(argument_));  // USB 2.0 9.4.5
       return Order::restart;
   }
+}
+
+/// Of one interface's endpoints.
+std::uint16_t Control::halts_of(std::uint8_t interface) {
+  if (interface == wire::link_interface) return halt_bit(wire::link_out_endpoint) | halt_bit(wire::link_in_endpoint);
+  if (interface == text_control_interface) return halt_bit(notify_endpoint);
+  return halt_bit(text_out_endpoint) | halt_bit(text_in_endpoint);
 }
 
 Order Control::descriptor(const Setup& s) {

@@ -31,7 +31,7 @@ enum class Order : std::uint8_t {
   configure,    // ... after opening all endpoints (argument() 1) or closing them (0)
   halt,         // ... after stalling endpoint argument()
   unhalt,       // ... after ending that stall, data toggle at DATA0
-  restart,      // ... after setting the data toggles of interface argument() back (SET_INTERFACE)
+  restart,      // ... after ending the stalls of interface argument(), its data toggles at DATA0 (SET_INTERFACE)
 };
 
 /// PSTN 1.2 table 17. Kept because hosts want to read back what they wrote; there is no line.
@@ -65,6 +65,7 @@ class Control {
   Order answer_word(std::uint16_t word, std::uint16_t bytes, const Setup& s);
   Order feature(const Setup& s, Order order);
   bool reaches(std::uint8_t endpoint) const;
+  static std::uint16_t halts_of(std::uint8_t interface);
   static constexpr std::uint16_t halt_bit(std::uint8_t endpoint) {
     return static_cast<std::uint16_t>(1u << ((endpoint & 7u) + (endpoint & hal::endpoint_in ? 8u : 0u)));
   }

@@ -108,6 +108,7 @@ class Device {
         break;
       case Order::restart:
         if (argument == link_pipe.interface) restart(link_pipe, link_pipe_, link_);
+        if (argument == text_control_interface) port_.unstall(notify_endpoint);
         if (argument == text_pipe.interface) restart(text_pipe, text_pipe_, text_);
         break;
     }

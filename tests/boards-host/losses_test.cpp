@@ -116,6 +116,49 @@ TEST(Losses, ADemandInStepWithTheSlowLaneHidesNoHeat) {
   }
 }
 
+/// Asked of a motor that turns, at the speed that it has: what the winding then becomes is no hotter than was said.
+TEST(Losses, AQuestionAskedAtASpeedKnowsItsRipple) {
+  wire::Motor motor = plant_tests::small_motor();
+  host_sim::BenchDesign design = plant_tests::bench_design(motor);
+  design.supply.can_sink = true;
+  host_sim::Bench bench(design, 1);
+  firmware::AxisSetup axis = {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
+                              thermal::three_phase_set(motor)};
+  axis.estimator.trust = thermal::identified_trust;
+  firmware::Driver driver({boards::dual_48V_20A, {axis, axis}});
+  std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
+                                                 boards::host::AxisDoor(bench, design.sensors, 1)};
+  bench.load(0).mode = host_sim::Load::Mode::imposed_speed;
+  constexpr int armed_ms = 200, asked_ms = 6000, to_ms = 36000;
+  const float q_A = static_cast<float>(2 * motor.rated_current_A);
+  thermal::ProfileRun run;
+  double hottest_degC = 0;
+  for (int ms = 0; ms < to_ms; ++ms) {
+    if (ms == armed_ms) (void)driver.axis(0).arm();
+    if (ms > armed_ms) (void)driver.axis(0).set_current({0.0f, q_A});
+    if (ms == armed_ms) bench.load(0).speed_rad_per_s = 18 / motor.pole_pairs / motor.flux_linkage_Wb;
+    for (int period = 0; period < 20; ++period) {
+      const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
+      for (std::size_t i = 0; i < 2; ++i) doors[i].drive(driver.axis(static_cast<int>(i)).tick(doors[i].sample()));
+      bench.advance_period(duty);
+    }
+    driver.watch();
+    if (ms % 10 == 9)
+      driver.slow_tick(boards::host::slow_sample(bench.board_raw(), design.sensors),
+                       {boards::host::slow_sample(bench.raw(0), design.sensors),
+                        boards::host::slow_sample(bench.raw(1), design.sensors)});
+    hottest_degC = std::max(hottest_degC, bench.truth(0).hottest_degC);
+    if (ms != asked_ms) continue;
+    const thermal::Piece piece{(to_ms - asked_ms) * 1e-3f, q_A};
+    ASSERT_TRUE(driver.axis(0).ask(run, &piece, 1, {{0.5f, 0.5f, 0.5f}}));
+    ASSERT_TRUE(run.go_on(driver.axis(0).core(), to_ms / 10));
+  }
+  EXPECT_EQ(driver.axis(0).mode(), firmware::Mode::running);
+  EXPECT_GT(hottest_degC, 80) << "nothing was heated, so nothing was shown";
+  EXPECT_GE(static_cast<double>(run.forecast().peak_degC), hottest_degC - 0.035 * (hottest_degC - design.start_degC))
+      << "beyond what the account of the ripple may be off by";
+}
+
 TEST(Losses, WhatTheMagnetBendsBetweenTwoSamplesCountsWithItsSign) {
   for (const float d_A : {-2 * small_A, 2 * small_A}) {
     const double share = counted_share(15, [&](int) { return wire::Dq{d_A, 0.0f}; });

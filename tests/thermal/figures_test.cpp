@@ -373,6 +373,29 @@ TEST(LookAhead, ACurrentTheOtherWayHeatsAsMuch) {
   }
 }
 
+/// Asked while a fan on the shaft turns, of a motion that may stand.
+TEST(LookAhead, NobodyPromisesThatAMotionIsCooledByTheSpeedOfNow) {
+  thermal::HeatSet<double> set = thermal::three_phase_set(reference::ec16());
+  set.links[set.link_count - 1].law = thermal::LinkLaw::speed;
+  set.links[set.link_count - 1].k = 0.05;
+  thermal::EstimatorSettings s;
+  s.trust = thermal::exact_trust;
+  s.margin_sigmas = 0;
+  thermal::CoreEstimator core(set, s);
+  thermal::HeatInput<> turning, standing;
+  thermal::set_speed(turning, 1000);
+  for (int i = 0; i < 60; ++i) core.tick(turning, {80, true}, {25.0f, true});
+  constexpr double push_A = 2.5;
+  const thermal::Piece push{60, static_cast<float>(push_A)};
+  thermal::ProfileRun run;
+  ASSERT_TRUE(run.begin(core, &push, 1, rotating));
+  ASSERT_TRUE(run.go_on(core, 6001));
+  for (int k = 0; k < 3; ++k) standing[thermal::phase_drive(k)] = 0.5 * push_A * push_A;
+  standing[thermal::Drive::current_A2] = push_A * push_A;
+  for (int i = 0; i < 6000; ++i) core.tick(standing, {}, {25.0f, true});
+  EXPECT_GE(run.forecast().peak_degC, static_cast<float>(core.estimate().hottest_degC()) - 0.5f);
+}
+
 TEST(LookAhead, UnusableOrEndlessProfilesAreNotFeasible) {
   const auto core = soaked(reference::ec16(), 25);
   const thermal::LookAhead look(core.network());

@@ -346,6 +346,24 @@ TEST_F(Enumeration, HaltAndItsEndSetTheToggleBack) {
   EXPECT_FALSE(board.bus().toggle(0x81));
 }
 
+/// USB 2.0 9.4.5: SET_INTERFACE ends a halt as well, even one of the setting that it had.
+TEST_F(Enumeration, SetInterfaceEndsTheHaltsOfItsEndpointsAndOfNoOther) {
+  configure();
+  for (const std::uint8_t endpoint : {std::uint8_t{0x01}, std::uint8_t{0x81}, std::uint8_t{0x03}, std::uint8_t{0x83}})
+    ASSERT_TRUE(ask(0x02, 3, 0, endpoint, 0));
+  ASSERT_TRUE(ask(0x01, 11, 0, 0, 0));
+  EXPECT_EQ(ask(0x82, 0, 0, 0x01, 2), (Bytes{0, 0}));
+  EXPECT_EQ(ask(0x82, 0, 0, 0x81, 2), (Bytes{0, 0}));
+  EXPECT_EQ(ask(0x82, 0, 0, 0x03, 2), (Bytes{1, 0}));
+  EXPECT_EQ(board.bus().out(address, 0x03, false, Bytes{0}), Handshake::stall);
+  const Bytes request = Program::framed(wire::Kind::state, 1, {});
+  EXPECT_EQ(board.bus().out(address, 0x01, false, request), Handshake::ack);
+  boards::host::UsbBus<VirtualBoard::Device>::Packet packet;
+  EXPECT_EQ(board.bus().in(address, 0x81, packet), Handshake::ack) << "and is answered";
+  ASSERT_TRUE(ask(0x01, 11, 0, 2, 0));
+  EXPECT_EQ(board.bus().out(address, 0x03, false, Bytes{'\n'}), Handshake::ack);
+}
+
 TEST_F(Enumeration, BothPortsAreSetBackOnTheirOwn) {
   configure();
   for (const std::uint8_t endpoint : {std::uint8_t{1}, std::uint8_t{3}}) {

@@ -285,4 +285,23 @@ TEST(Ask, WhatIsToldUnaskedIsNothingRatherThanOldWhileAProgramAsks) {
   EXPECT_LT(told_s, 2.0f);
 }
 
+/// A board fresh from the factory knows no winding: what it bears is nothing, and no question about it has an answer.
+TEST(Ask, OfAWindingThatNobodyDescribedNothingIsPromised) {
+  boards::host::VirtualBoardOptions o = options();
+  o.has_parameters = false;
+  VirtualBoard board(o);
+  Program program(board);
+  board.advance(80000);
+  program.connect();
+  const auto now = program.call_for<wire::State>(Kind::state);
+  for (const wire::AxisReport& axis : now.axis) {
+    EXPECT_EQ(axis.time_left_s, 0.0f);
+    EXPECT_EQ(axis.allowance_1s_A, 0.0f);
+    EXPECT_EQ(axis.allowance_A, 0.0f);
+  }
+  for (const std::uint8_t axis : {std::uint8_t{0}, std::uint8_t{1}})
+    EXPECT_EQ(program.status(Kind::ask, bytes_of(wire::Ask{axis, 1}, wire::Segment{60.0f, 20.0f})),
+              number(Status::parameters_unset));
+}
+
 }  // namespace

@@ -191,6 +191,39 @@ TEST_F(Typed, TheTerminalAndAProgramExcludeEachOther) {
   EXPECT_EQ(hear(), "ok\r\n");
 }
 
+/// As a script prints them: the digits behind the point pass a float's range before the line's end.
+TEST_F(Typed, DigitsThatNoFloatHoldsChangeNoNumber) {
+  EXPECT_EQ(wait("set ramp 0.30000000000000000000000000000000000000000\n"), "ok\r\n");
+  EXPECT_EQ(in_force("ramp", 0), 0.3f);
+  EXPECT_EQ(wait("set R1 0.5" + std::string(45, '0') + "\n"), "ok\r\n");
+  EXPECT_EQ(in_force("R1", 0), 0.5f);
+  EXPECT_EQ(wait("set ramp 00000000000000000000000000000000000000000.4\n"), "ok\r\n");
+  EXPECT_EQ(in_force("ramp", 0), 0.4f);
+  EXPECT_EQ(type("set ramp 1" + std::string(45, '0') + "\n"), "it may be 0.005 to 1 s\r\n");
+  EXPECT_EQ(type("iq 0 1" + std::string(45, '0') + "\n").substr(0, 12), "the setpoint");
+}
+
+/// Who names two axes means both, and who is told "ok" believes it.
+TEST_F(Typed, ALineWithMoreWordsThanItsCommandHasIsNotObeyed) {
+  EXPECT_EQ(type("arm 0\narm 1\n"), "ok\r\nok\r\n");
+  board.advance(2);
+  EXPECT_EQ(type("disarm 0 1\n").find("ok"), std::string::npos) << "axis 1 stays armed";
+  board.advance(2);
+  EXPECT_EQ(axis(0).mode(), firmware::Mode::off) << "what it names is off all the same";
+  EXPECT_EQ(type("arm 0\n"), "ok\r\n");
+  board.advance(2);
+  EXPECT_EQ(type("iq 0 1 .5\n").find("ok"), std::string::npos);
+  board.advance(2);
+  EXPECT_NE(axis(0).mode(), firmware::Mode::running);
+  EXPECT_EQ(type("disarm 0 \ndisarm 1\n"), "ok\r\nok\r\n");
+  board.advance(2);
+  EXPECT_EQ(type("arm 0 1\n").find("ok"), std::string::npos);
+  EXPECT_EQ(type("set ramp 0.3 0 1\n").find("ok"), std::string::npos);
+  board.advance(60);
+  EXPECT_EQ(hear(), "");
+  EXPECT_EQ(in_force("ramp", 0), 0.2f);
+}
+
 TEST_F(Typed, TorqueModeHasItsOwnWord) {
   EXPECT_EQ(type("torque 0 0.05\n").substr(0, 29), "the setpoint has another unit");
   EXPECT_EQ(type("mode 0 torque\n"), "ok\r\n");
