@@ -25,7 +25,9 @@ constexpr double sure_rad = 0.03;  // one sigma: of the torque a thousandth
 constexpr double turn = 1.1;       // of the shaft, to meet the encoder's index for certain
 constexpr double longest_turn_s = 30;
 constexpr double first_push_s = 0.02, longest_push_s = 0.3, coast_s = 0.05;
+constexpr double noise_share = 0.05, runaway = 4;  // of the speed, of the fastest that is wanted
 constexpr double learn_s = 0.5;  // more than twice what a board needs to learn its current sensors' offsets
+constexpr double least_A = 0.1;  // five counts of the current sensors (boards/h8-15d/board.hpp); less creeps anywhere
 constexpr double first_share = 0.05, louder = 1.5;  // of the most that may flow
 // Back-EMF of the magnet where it is not believed to be: twice this is less than firmware/watch.hpp lets pass.
 constexpr double most_of_bus = 0.01;
@@ -67,11 +69,11 @@ class Shaft {
   /// it may be: how long that was.
   double push(double current_A, double angle_rad, double seconds) {
     const double start_s = session_.now_s();
-    double last_rad_per_s = INFINITY;  // a push that slows a fast shaft goes on
+    double slowest_rad_per_s = INFINITY;  // a push that slows a fast shaft goes on
     while (session_.now_s() < start_s + seconds) {
       const double speed_rad_per_s = std::fabs(step(current_A, angle_rad));
-      if (speed_rad_per_s > std::max(fastest_rad_per_s_, last_rad_per_s)) break;
-      last_rad_per_s = speed_rad_per_s;
+      if (speed_rad_per_s > std::max(fastest_rad_per_s_, slowest_rad_per_s + noise_share * fastest_rad_per_s_)) break;
+      slowest_rad_per_s = std::min(slowest_rad_per_s, speed_rad_per_s);
       session_.wait_until(std::min(session_.now_s() + push_interval_s, start_s + seconds));
     }
     return session_.now_s() - start_s;
@@ -124,6 +126,11 @@ class Shaft {
                q_A = static_cast<float>(current_A * std::sin(angle_rad));
     const wire::State state = session_.exchange({mask_, {}, 0, {d_A, d_A}, {q_A, q_A}});
     const wire::AxisReport& axis = state.axis[axis_];
+    if (axis.fault == 0 && std::fabs(double{axis.speed_rad_per_s}) > runaway * fastest_rad_per_s_)
+      refuse_data(
+          fmt::format("The shaft of axis {} went on to {:.0f} rad/s, so it was let go: does something drive it? Stop "
+                      "it and align again.",
+                      axis_, axis.speed_rad_per_s));
     if (axis.fault == 0) return axis.speed_rad_per_s;
     const std::string tripped = fmt::format("Axis {} tripped: {}.", axis_, fault_sentence(session_.fault(axis_)));
     if (static_cast<wire::Fault>(axis.fault) == wire::Fault::invalid_sample) throw Invalid(Exit::refused, tripped);
@@ -160,7 +167,7 @@ struct Aligned {
 Aligned align_shaft(Console& console, int axis, const Values& values, double most_A) {
   Shaft shaft(console.session(), axis, values);
   const int pole_pairs = static_cast<int>(value_of(values, "pole_pairs"));
-  double current_A = first_share * most_A, seconds = first_push_s;
+  double current_A = std::min(std::max(least_A, first_share * most_A), most_A), seconds = first_push_s;
   const auto push_until_sure = [&] {
     for (;;) {
       console.tell(
@@ -193,11 +200,11 @@ Aligned align_shaft(Console& console, int axis, const Values& values, double mos
 /// An offset that is tried: with the end of this, the one before is in force again.
 class Trial {
  public:
-  Trial(Session& session, int axis)
+  Trial(Session& session, int axis, float before_rad)
       : session_(session),
         offset_(session.parameters().named(fmt::format("axis{}.angle_offset_rad", axis)).front()),
-        before_rad_(session.get({offset_}).front()),
-        in_force_rad_(before_rad_) {}
+        before_rad_(before_rad),
+        in_force_rad_(before_rad) {}
   ~Trial() {
     try {
       put(before_rad_);
@@ -207,7 +214,6 @@ class Trial {
   }
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
-  float before_rad() const { return before_rad_; }
   void put(float offset_rad) {
     if (offset_rad != in_force_rad_) session_.set({{offset_, offset_rad}});
     in_force_rad_ = offset_rad;
@@ -232,14 +238,12 @@ void align(Console& console, const AlignArguments& a) {
   console.tell(fmt::format(
       "Axis {} is pushed with up to {:.2g} A; its shaft must be free to turn round. Ctrl-C disarms.", axis, most_A));
   Aligned aligned;
-  double offset_rad = 0;
+  double offset_rad = value_of(before, "angle_offset_rad");
   {
-    Trial trial(session, axis);
-    if (!std::isnan(trial.before_rad())) offset_rad = trial.before_rad();
+    Trial trial(session, axis, static_cast<float>(offset_rad));
     // A board that has not met its encoder's index goes by its Hall switches; an index that contradicts them by more
     // than a sector it takes for a fault. Of four quarters one is close enough.
     for (int quarter = 0;; ++quarter) {
-      trial.put(static_cast<float>(offset_rad));
       try {
         aligned = align_shaft(console, axis, before, most_A);
         break;
@@ -271,7 +275,7 @@ void add_align(CLI::App& app, Console& console) {
   CLI::App* command = app.add_subcommand("align", "find angle_offset: a free shaft is pushed and turned once round");
   command->add_option("--axis", a->axis, "0 or 1")->capture_default_str()->check(CLI::IsMember({"0", "1"}));
   command->add_option("--current", a->current_A, "the most that may flow, A; else the continuous current")
-      ->check(between(0.01, 1000));
+      ->check(between(least_A, 1000));
   add_consent(*command, a->consent);
   command->callback([&console, a] { align(console, *a); });
 }

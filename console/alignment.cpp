@@ -16,8 +16,9 @@ constexpr double longest_row_s = 0.003;  // rows further apart have others missi
 constexpr float still_share = 0.02f;     // of the largest speed: below it friction holds the shaft, and no answer comes
 constexpr int fewest_answers = 24;       // to four unknowns
 constexpr int most_pole_pairs = 50;      // firmware/axis.params
-// Another number of turns has to leave half of what the believed one leaves: of hundreds of answers chance does not.
-constexpr double far_better = 0.5;
+// Another number of turns has to leave half of what the believed one leaves, and so little that of a hundred numbers
+// chance would find one in 30000 logs: e^-15 each.
+constexpr double far_better = 0.5, beyond_chance = 15;
 
 }  // namespace
 
@@ -69,16 +70,18 @@ Alignment::Found Alignment::fit(int more) const {
   const double push2 = found[0] * found[0] + found[1] * found[1];
   const Eigen::Vector4d across{found[1] / push2, -found[0] / push2, 0, 0};  // by which the angle follows both
   return {std::atan2(found[0], found[1]), std::sqrt(variance * across.dot(solver.inverse() * across)), std::sqrt(push2),
-          left / all};
+          left / all, answers};
 }
 
 int Alignment::turns(int pole_pairs) const {
-  const auto left = [&](int turns) { return fit(turns - pole_pairs).left; };
+  const Found believed = fit(0);
+  const auto left = [&](int turns) { return turns == 0 ? 1 : fit(turns - pole_pairs).left; };
   int best = pole_pairs;
-  double least = far_better * left(pole_pairs);
+  double least = believed.left * std::min(far_better, std::exp(-2 * beyond_chance / std::max(believed.answers, 1)));
   for (int turns = -most_pole_pairs; turns <= most_pole_pairs; ++turns) {
-    if (turns == 0 || turns == pole_pairs || !(left(turns) < least)) continue;
-    least = left(turns);
+    const double its = left(turns);
+    if (!(its < least)) continue;
+    least = its;
     best = turns;
   }
   // Two leads the wrong way round are likelier than that and other pole pairs at once.

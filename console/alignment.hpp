@@ -25,6 +25,7 @@ class Alignment {
     double sigma_rad = 10;    // one sigma; beyond any angle while too little is known
     double rad_per_s2_A = 0;  // what an ampere does for the shaft where it pushes most
     double left = 1;          // of the answers' squares, what stays unexplained
+    int answers = 0;          // that this comes from
   };
 
   void take(const Row& row) { rows_.push_back(row); }

@@ -12,7 +12,7 @@ namespace console {
 double value_of(const Values& values, const std::string& name) {
   const auto at = values.find(name);
   if (at == values.end() || std::isnan(at->second)) {
-    wire::pc::refuse(fmt::format("{} is {} on this axis; set it from the motor's sheet first, then identify.", name,
+    wire::pc::refuse(fmt::format("{} is {} on this axis; tell it its motor first, 'hotcore motor'.", name,
                                  at == values.end() ? "not known" : "unset"));
   }
   return double{at->second};

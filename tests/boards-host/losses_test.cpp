@@ -6,9 +6,7 @@
 
 #include <algorithm>
 
-#include "boards/dual_48v_20a.hpp"
-#include "boards/host/board.hpp"
-#include "firmware/driver.hpp"
+#include "tests/boards-host/driven_bench.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
 #include "thermal/motor_set.hpp"
 
@@ -73,12 +71,10 @@ double counted_share(double emf_V, Asked asked_A) {
   motor.copper_coefficient_per_K = 0;  // or heat would not be A^2 s
   host_sim::BenchDesign design = plant_tests::bench_design(motor);
   design.supply.can_sink = true;
-  host_sim::Bench bench(design, 1);
-  const firmware::AxisSetup axis = {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
-                                    thermal::three_phase_set(motor)};
-  firmware::Driver driver({boards::dual_48V_20A, {axis, axis}});
-  std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
-                                                 boards::host::AxisDoor(bench, design.sensors, 1)};
+  board_tests::DrivenBench driven(
+      design, {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}), thermal::three_phase_set(motor)});
+  host_sim::Bench& bench = driven.bench;
+  firmware::Driver& driver = driven.driver;
   bench.load(0).mode = host_sim::Load::Mode::imposed_speed;
   constexpr int armed_ms = 200, from_ms = 400, to_ms = 1000;
   double counted_A2s = 0, before_J = 0;
@@ -87,18 +83,7 @@ double counted_share(double emf_V, Asked asked_A) {
     if (ms > armed_ms) (void)driver.axis(0).set_current(asked_A(ms));
     if (ms == armed_ms) bench.load(0).speed_rad_per_s = emf_V / motor.pole_pairs / motor.flux_linkage_Wb;
     if (ms == from_ms) before_J = bench.energy().copper_J;
-    for (int period = 0; period < 20; ++period) {
-      const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
-      for (int i = 0; i < 2; ++i)
-        doors[static_cast<std::size_t>(i)].drive(driver.axis(i).tick(doors[static_cast<std::size_t>(i)].sample()));
-      bench.advance_period(duty);
-    }
-    driver.watch();
-    if (ms % 10 != 9) continue;
-    driver.slow_tick(boards::host::slow_sample(bench.board_raw(), design.sensors),
-                     {boards::host::slow_sample(bench.raw(0), design.sensors),
-                      boards::host::slow_sample(bench.raw(1), design.sensors)});
-    if (ms > from_ms) counted_A2s += driver.axis(0).current2_A2() * 0.01;
+    if (driven.advance_ms() && ms > from_ms) counted_A2s += driver.axis(0).current2_A2() * 0.01;
   }
   EXPECT_EQ(driver.axis(0).mode(), firmware::Mode::running);
   return counted_A2s * 1.5 * motor.phase_resistance_ohm / (bench.energy().copper_J - before_J);
@@ -121,13 +106,12 @@ TEST(Losses, AQuestionAskedAtASpeedKnowsItsRipple) {
   wire::Motor motor = plant_tests::small_motor();
   host_sim::BenchDesign design = plant_tests::bench_design(motor);
   design.supply.can_sink = true;
-  host_sim::Bench bench(design, 1);
   firmware::AxisSetup axis = {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
                               thermal::three_phase_set(motor)};
   axis.estimator.trust = thermal::identified_trust;
-  firmware::Driver driver({boards::dual_48V_20A, {axis, axis}});
-  std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
-                                                 boards::host::AxisDoor(bench, design.sensors, 1)};
+  board_tests::DrivenBench driven(design, axis);
+  host_sim::Bench& bench = driven.bench;
+  firmware::Driver& driver = driven.driver;
   bench.load(0).mode = host_sim::Load::Mode::imposed_speed;
   constexpr int armed_ms = 200, asked_ms = 6000, to_ms = 36000;
   const float q_A = static_cast<float>(2 * motor.rated_current_A);
@@ -137,16 +121,7 @@ TEST(Losses, AQuestionAskedAtASpeedKnowsItsRipple) {
     if (ms == armed_ms) (void)driver.axis(0).arm();
     if (ms > armed_ms) (void)driver.axis(0).set_current({0.0f, q_A});
     if (ms == armed_ms) bench.load(0).speed_rad_per_s = 18 / motor.pole_pairs / motor.flux_linkage_Wb;
-    for (int period = 0; period < 20; ++period) {
-      const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
-      for (std::size_t i = 0; i < 2; ++i) doors[i].drive(driver.axis(static_cast<int>(i)).tick(doors[i].sample()));
-      bench.advance_period(duty);
-    }
-    driver.watch();
-    if (ms % 10 == 9)
-      driver.slow_tick(boards::host::slow_sample(bench.board_raw(), design.sensors),
-                       {boards::host::slow_sample(bench.raw(0), design.sensors),
-                        boards::host::slow_sample(bench.raw(1), design.sensors)});
+    driven.advance_ms();
     hottest_degC = std::max(hottest_degC, bench.truth(0).hottest_degC);
     if (ms != asked_ms) continue;
     const thermal::Piece piece{(to_ms - asked_ms) * 1e-3f, q_A};

@@ -121,6 +121,21 @@ TEST(Alignment, NamesPolePairsThatAreOthers) {
   EXPECT_GE(named, of / 2);  // the others moved too little to tell
 }
 
+/// Speeds and angles at random, of which no number of turns is the reason.
+TEST(Alignment, ChanceNamesNoPolePairs) {
+  int named = 0;
+  for (unsigned seed = 1; seed <= 500; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<float> normal;
+    const int rows = 200 + static_cast<int>(random() % 100);
+    Alignment seen;
+    for (int i = 0; i < rows; ++i)
+      seen.take({1e-3 * i, normal(random), normal(random), normal(random), 3 * normal(random)});
+    named += seen.turns(1) == 1 ? 0 : 1;
+  }
+  EXPECT_EQ(named, 0);
+}
+
 TEST(Alignment, AShaftThatStandsTellsNothing) {
   std::mt19937 random(1);
   Shaft shaft = drawn(random);

@@ -3,14 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdio>
 
-#include "boards/dual_48v_20a.hpp"
-#include "boards/host/board.hpp"
 #include "console/heat_experiment.hpp"
-#include "firmware/driver.hpp"
+#include "tests/boards-host/driven_bench.hpp"
 #include "tests/host-sim/plant_fixtures.hpp"
 #include "thermal/motor_set.hpp"
 
@@ -106,32 +103,17 @@ TEST(Ohmmeter, AtOneCurrentOnlyTheWindingMovesVoltsOverAmperes) {
     design.bridge.switched = true;
     const auto probe_A = static_cast<float>(console::probe_share * motor.rated_current_A / wire::direct_per_amplitude);
     const auto volts_over_amperes = [&](double soaked_degC) {
-      host_sim::Bench bench(design, 1);
-      bench.soak(soaked_degC);
-      bench.load(0).mode = host_sim::Load::Mode::locked;
-      const firmware::AxisSetup axis = {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
-                                        thermal::three_phase_set(motor)};
-      firmware::Driver driver({boards::dual_48V_20A, {axis, axis}});
-      std::array<boards::host::AxisDoor, 2> doors = {boards::host::AxisDoor(bench, design.sensors, 0),
-                                                     boards::host::AxisDoor(bench, design.sensors, 1)};
+      board_tests::DrivenBench driven(design, {firmware::parameters_from(motor, boards::dual_48V_20A, {48.0f, 0.0f}),
+                                               thermal::three_phase_set(motor)});
+      firmware::Driver& driver = driven.driver;
+      driven.bench.soak(soaked_degC);
+      driven.bench.load(0).mode = host_sim::Load::Mode::locked;
       console::Ohmmeter meter(probe_A, 2 * probe_A, 0);
       (void)meter.cold();
       for (int ms = 0; ms < 600; ++ms) {
         if (ms == 300) (void)driver.axis(0).arm();
         if (ms > 400) (void)driver.axis(0).set_current({probe_A, 0});
-        for (int period = 0; period < 20; ++period) {
-          const std::array<hal::Duty, 2> duty = {doors[0].next(), doors[1].next()};
-          for (int i = 0; i < 2; ++i) {
-            auto& door = doors[static_cast<std::size_t>(i)];
-            door.drive(driver.axis(i).tick(door.sample()));
-          }
-          bench.advance_period(duty);
-        }
-        driver.watch();
-        if (ms % 10 == 9)
-          driver.slow_tick(boards::host::slow_sample(bench.board_raw(), design.sensors),
-                           {boards::host::slow_sample(bench.raw(0), design.sensors),
-                            boards::host::slow_sample(bench.raw(1), design.sensors)});
+        driven.advance_ms();
         if (ms % 2 != 0) continue;
         const firmware::FastView fast = driver.axis(0).fast();
         if (const auto r = meter.take({1e-3 * ms, fast.permitted_A.d, fast.current_A.d, fast.voltage_V.d, 1.0f}))
